@@ -85,9 +85,9 @@ def _bends(draws: int) -> sp.study.Study:
 
 
 def _paths(cases: list[sp.study.Case]) -> object:
-    paths = (sp.examples.kane_scher(**case.parameters) for case in cases)
-    momenta = np.array([case.momentum for case in cases])
-    return sp.final_attitudes(sp.load_body("cat_two_halves"), paths, momenta).attitude
+    body = sp.load_body("cat_two_halves")
+    deformations = (sp.articulated(body, sp.examples.kane_scher(**case.parameters)) for case in cases)
+    return [sp.reconstruct(d, case.momentum).final_attitude for d, case in zip(deformations, cases, strict=True)]
 
 
 WORKLOADS = {

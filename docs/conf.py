@@ -18,6 +18,8 @@ from _site.coverage import write_tables
 from _site.docstrings import bars_are_norms, entries_are_descriptions, name_aliases
 from _site.equations import citing, with_citations
 from _site.executed_notebooks import library_digest, quiet_kernels, write_pages
+from _site.forked_kernels import fork_kernels
+from _site.gallery_rows import with_rows
 from _site.live_pages import write_live_pages
 from _site.name_links import places, with_names
 from _site.reference_pages import write_reference
@@ -110,8 +112,9 @@ mathjax3_config = {"options": {"enableMenu": False}, "svg": {"fontCache": "globa
 
 
 def _write_pages(*_: object) -> None:
-    """Pages that are made: the reference, tables of the theory, live pages, and executed notebooks."""
+    """Start what executes pages; write the reference, tables of the theory, live pages and executed notebooks."""
     quiet_kernels(HERE / "_build" / "ipython")
+    fork_kernels()
     write_reference(HERE / "reference")
     write_tables(HERE.parent)
     write_live_pages(LIVE)
@@ -126,6 +129,8 @@ def _add_targets(_: Sphinx, page: str, source: list[str]) -> None:
         source[0] = with_citations(source[0], citing(HERE / "reference"))
     if page.startswith(("theory/", "explanation/", "howto/")):
         source[0] = with_names(source[0], places(HERE / "reference"))
+    if page == "gallery":
+        source[0] = with_rows(source[0], HERE / "gallery" / "rows", places(HERE / "reference"))
 
 
 def _plain_docstring(*event: Any) -> None:

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from support.bodies import BODIES
-from support.browser import chromium  # noqa: F401 (a fixture)
+from support.bodies import BODIES, EVERY_BODY
+from support.browser import _browser, chromium  # noqa: F401 (fixtures)
 
 
 def pytest_configure(config):
@@ -55,7 +55,7 @@ def loaded(name):
     return sp.load_body(name)
 
 
-@pytest.fixture(scope="session", params=BODIES)
+@pytest.fixture(scope="session", params=EVERY_BODY)
 def body(request):
     return loaded(request.param)
 
@@ -81,7 +81,7 @@ def few_guesses(monkeypatch):
 @pytest.fixture
 def no_pictures(monkeypatch):
     """Reports whose figures are drawn as nothing, for tests of their words."""
-    monkeypatch.setattr("shapephase.plots.report_page.figure_image", lambda *_: b"<svg/>")
+    monkeypatch.setattr("shapephase.plots.pages.report_page.figure_image", lambda *_: b"<svg/>")
 
 
 @pytest.fixture(scope="session")

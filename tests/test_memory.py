@@ -25,7 +25,7 @@ def once(k):
     "reports": """
 import tempfile
 from pathlib import Path
-from shapephase.plots.report_page import report
+from shapephase.plots.pages.report_page import report
 body, path = sp.load_body("cat_two_halves"), kane_scher(0.3, 1.0)
 folder = tempfile.TemporaryDirectory()
 def once(k):

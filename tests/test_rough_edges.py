@@ -24,7 +24,7 @@
 | `--out` that is a folder, a full disk, `--json > /dev/full` | `cli/test_endings.py::test_what_cannot_be_written_is_said_before_anything_is_computed`, `cli/test_endings.py::test_standard_output_that_is_full`, `test_rough_edges.py::test_a_full_disk_is_one_line_and_leaves_the_old_file`, `test_writers.py::test_a_full_disk_leaves_the_old_file` |
 | joint names such as `$x_$` in figures | `plots/test_hostile_names.py::test_a_figure_shows_the_letters_of_a_name`, `plots/test_hostile_names.py::test_every_name_has_its_line_in_the_legend` |
 | `fixed_points` and `orbits` at three turns a loop | `phases/test_return_map.py::test_fixed_points_of_an_unstable_loop_close_by_another_integrator`, `cli/test_endings.py::test_orbits_takes_a_tolerance` |
-| pickling gauges and motions by DOP853 | `test_objects.py::test_it_pickles_and_copies`, `test_objects.py::test_what_is_made_of_a_lambda_says_so_and_is_copied_all_the_same` |
+| pickling gauges and motions by DOP853 | `test_objects.py::test_they_pickle_and_copy`, `test_objects.py::test_what_is_made_of_a_lambda_says_so_and_is_copied_all_the_same` |
 | a recording of 200,000 rows, a report of 10,000 | `test_rough_edges.py::test_a_long_recording_takes_bounded_memory`, `plots/test_plots.py::test_long_curves_are_images_within_the_figure` |
 | `x.NPZ` | `cli/test_endings.py::test_what_was_written_is_said_unless_it_is_quiet`, `cli/test_endings.py::test_endings_in_any_case` |
 | `kill -9` while writing | `test_files.py::test_killed_at_random_times_a_writer_leaves_no_half`, `test_writers.py::test_a_writer_that_is_killed_leaves_the_old_file_or_the_new_one` |

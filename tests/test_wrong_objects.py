@@ -17,7 +17,7 @@ from test_documentation import LONG, NAMES
 TRIED = [name for name in NAMES if name not in LONG and not name.removeprefix("shapephase.").startswith(TRUSTING)]
 # Of these an example takes a few milliseconds, and so do the calls with something wrong.
 QUICK = ("shapephase.articulated", "shapephase.reconstruct", "shapephase.momentum_from_rate", "shapephase.split",
-         "shapephase.holonomy", "shapephase.final_attitudes", "shapephase.base_difference", "shapephase.ShapePath",
+         "shapephase.holonomy", "shapephase.base_difference", "shapephase.ShapePath",
          "shapephase.bounds.return_time_bounds", "shapephase.link_gauge", "shapephase.examples.kane_scher",
          "shapephase.load_motion", "shapephase.rigid_body.cones")  # fmt: skip
 # Arguments of a study, and what each may be.

@@ -97,12 +97,19 @@ def cleaned(notebook: Any) -> Any:
         "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
         "language_info": {"name": "python"},
     }
+    count = 0
     for cell in notebook.cells:
         cell.metadata = {name: cell.metadata[name] for name in ("tags", "jupyter") if name in cell.metadata}
         if cell.cell_type == "code":
+            # What installs the library elsewhere is not counted: readers of the site do not see it.
+            installs = "colab" in cell.metadata.get("tags", ())
+            count += not installs
+            cell.execution_count = None if installs else count
             cell.outputs = _merged(cell.outputs)
             for output in cell.outputs:
                 output.pop("metadata", None)
+                if "execution_count" in output:
+                    output.execution_count = count
                 if "data" in output:
                     output.metadata = {}
                     if "image/png" in output.data:

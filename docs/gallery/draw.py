@@ -1,110 +1,91 @@
-"""Draw the pictures of the gallery: `python docs/gallery/draw.py`, or with the names of some of them.
+"""Draw the pictures of the gallery by the code that its page shows: `python docs/gallery/draw.py`, or with names.
 
-They are written beside this file, in 128 colours.
+A row is a file of `rows/`: Python that ends with the axes `ax`, or one command line. Its picture is written beside this
+file, 442 pixels wide, in 128 colours; pages and films need Chromium.
 """
 
 from __future__ import annotations
 
+import os
+import shlex
+import subprocess
 import sys
-from collections.abc import Callable
-from functools import cache
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from matplotlib.axes import Axes
 from PIL import Image
 
-import shapephase as sp
-from shapephase import plots
-from shapephase.examples import MOTIONS
-from shapephase.plots import column_axes
+from shapephase.cli.main import main
+from shapephase.plots.pages.video import chromium
 
 HERE = Path(__file__).parent
-# Dots per inch: 440 pixels wide, as a column of the page.
-RESOLUTION = 130
+ROWS = {file.stem: file for file in sorted((HERE / "rows").iterdir())}
+# Pixels: a column of the page, and the window that a page is opened in.
+WIDTH = 442
+WINDOW = {"explore": (1000, 900), "rolling_page": (900, 760), "plan": (900, 760), "split": (900, 1300)}
+USUAL_WINDOW = (900, 1000)
+RESOLUTION = 260  # [dots per inch] that figures are drawn in, before they are made smaller
 COLOURS = 128
-# Angular momenta [kg m^2/s], and the shape of the loop of Kane and Scher [rad].
-MOMENTA = {
-    "astronaut": (0.5, 2.0, 3.0),
-    "cat": (0.0, 0.0, 0.0),
-    "cat_two_halves": (0.0, 0.002, 0.005),
-    "diver": (0.0, 61.558831, 0.0),
-}
-BEND = 1.037187
-# Pictures in space.
-SOLID = ("caustic", "loop_space")
-TOP = ([1.0, 2.0, 3.0], [0.3, 0.5, 0.9])
+WIDEST = 4.0  # [height] a film in pictures side by side is cut in two rows
+CANNOT_TELL = 12  # exit code of an audit
+READY = 20_000  # [ms] that a page is given to draw itself
+FLAGS = "--headless=new --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --hide-scrollbars"
 
 
-@cache
-def motion(body: str, name: str) -> sp.Motion:
-    """A motion of the library, with its momentum."""
-    path = sp.examples.kane_scher(0.0, BEND) if name == "kane_scher" else MOTIONS[name].path()
-    return sp.reconstruct(sp.articulated(sp.load_body(body), path), MOMENTA[body])
+def image_of(name: str) -> Image.Image:
+    """Run a row in an empty folder, and return what it draws."""
+    code, before = ROWS[name].read_text(encoding="utf-8"), Path.cwd()
+    with TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            Path("robots").symlink_to(HERE.parent.parent / "robots")
+            return _drawn_by_command(name, code) if ROWS[name].suffix == ".sh" else _drawn_by_python(code)
+        finally:
+            os.chdir(before)
 
 
-def top(moments: list[float], momentum: list[float]) -> sp.EulerTop:
-    """A free rigid body by its principal moments [kg m^2]."""
-    return sp.EulerTop.principal(moments, momentum)
+def _drawn_by_python(code: str) -> Image.Image:
+    names: dict[str, object] = {}
+    exec(compile(code, "row", "exec"), names)
+    stream = BytesIO()
+    names["ax"].figure.savefig(stream, format="png", dpi=RESOLUTION)  # type: ignore[attr-defined]
+    return Image.open(stream)
 
 
-DRAWINGS: dict[str, tuple[float, Callable[[Axes], object]]] = {
-    "loop": (5.2, lambda ax: plots.plot_loop(ax, sp.load_body("cat"), MOTIONS["cat_righting"].path())),
-    "loop_principal": (
-        5.2,
-        lambda ax: plots.plot_loop(
-            ax, sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, BEND), "principal", axis="norm"
-        ),
-    ),
-    "curvature": (
-        2.8,
-        lambda ax: plots.plot_curvature(
-            ax, sp.load_body("satellite"), ("arm_1", "boom_extension"), path=MOTIONS["satellite_sweep"].path()
-        ),
-    ),
-    "reach": (2.8, lambda ax: plots.plot_reach(ax, sp.reachable(sp.load_body("cat")))),
-    "attitude": (2.8, lambda ax: plots.plot_attitude(ax, motion("diver", "diver_twist"))),
-    "energy": (2.8, lambda ax: plots.plot_energy(ax, motion("diver", "diver_twist"))),
-    "joints": (2.8, lambda ax: plots.plot_shape_path(ax, MOTIONS["cat_righting"].path(), sp.load_body("cat"))),
-    "momentum": (3.9, lambda ax: plots.plot_momentum_curve(ax, motion("cat_two_halves", "kane_scher"))),
-    "phases": (2.8, lambda ax: plots.plot_phases(ax, motion("cat_two_halves", "kane_scher"))),
-    "segment_momentum": (
-        3.4,
-        lambda ax: plots.plot_segment_momentum(ax, sp.segment_momentum(motion("cat", "cat_righting")), "z"),
-    ),
-    "direct_shares": (2.8, lambda ax: plots.plot_direct_shares(ax, sp.contributions(motion("cat", "cat_righting")))),
-    "shares": (2.8, lambda ax: plots.plot_shares(ax, sp.contributions(motion("cat", "cat_righting")))),
-    "solid_angle": (3.9, lambda ax: plots.plot_momentum_curve(ax, motion("astronaut", "astronaut_leg_swing"))),
-    "polhodes": (3.8, lambda ax: plots.plot_polhodes(ax, top(*TOP))),
-    "separatrix": (3.8, lambda ax: plots.plot_polhodes(ax, top([3.0, 6.0, 8.0], [0.5, 0.3, 1.0]))),
-    "herpolhode": (3.8, lambda ax: plots.plot_herpolhode(ax, top(*TOP))),
-    "rolling": (3.6, lambda ax: plots.plot_rolling_ellipsoid(ax, top(*TOP), 1.0)),
-    "cones_oblate": (3.6, lambda ax: plots.plot_cones(ax, top([1.0, 1.0, 1.7], [0.3, 0.5, 0.8]))),
-    "cones_prolate": (3.6, lambda ax: plots.plot_cones(ax, top([2.0, 2.0, 0.8], [0.3, 0.5, 0.8]))),
-    "caustic": (3.6, lambda ax: plots.plot_caustic(ax, [2.0, 2.0, 1.0])),
-    "loop_space": (
-        5.2,
-        lambda ax: plots.plot_loop(
-            ax, sp.load_body("cat"), MOTIONS["cat_righting"].path(), ("waist_pitch", "waist_yaw", "neck_yaw")
-        ),
-    ),
-}
+def _drawn_by_command(name: str, code: str) -> Image.Image:
+    words = shlex.split(code.replace("\\\n", ""))
+    try:
+        main([*words[1:], "--quiet"])
+    except SystemExit as end:
+        if end.code not in (0, None, CANNOT_TELL):
+            raise
+    out = Path(words[-1]).resolve()
+    if out.suffix == ".html":
+        width, height = WINDOW.get(name, USUAL_WINDOW)
+        size = f"--window-size={width},{height} --virtual-time-budget={READY} --screenshot={out}.png"
+        subprocess.run([chromium(), *FLAGS.split(), *size.split(), out.as_uri()], check=True, capture_output=True)
+        out = Path(f"{out}.png")
+    image = Image.open(out)
+    image.load()
+    return image
 
 
 def draw(name: str, folder: Path = HERE) -> Path:
-    """Write one of the pictures; returns its file."""
-    height, drawing = DRAWINGS[name]
-    ax = column_axes(height, projection="3d" if name in SOLID else None)
-    drawing(ax)
-    stream = BytesIO()
-    ax.figure.savefig(stream, format="png", dpi=RESOLUTION)
+    """Write the picture of a row; returns its file."""
+    image = image_of(name).convert("RGB")
+    if image.width > WIDEST * image.height:
+        left = image.crop((0, 0, image.width // 2, image.height))
+        both = Image.new("RGB", (left.width, 2 * left.height), "white")
+        both.paste(left, (0, 0))
+        both.paste(image.crop((left.width, 0, 2 * left.width, image.height)), (0, left.height))
+        image = both
+    image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
     file = folder / f"{name}.png"
-    Image.open(stream).convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
-        file, optimize=True
-    )
+    image.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, optimize=True)
     return file
 
 
 if __name__ == "__main__":
-    for chosen in sys.argv[1:] or DRAWINGS:
+    for chosen in sys.argv[1:] or ROWS:
         print(draw(chosen))

@@ -11,6 +11,7 @@ from . import (
     exports,
     inertia_tensor,
     integrator,
+    inverse_design,
     optimal_control,
     phases,
     planar,
@@ -54,6 +55,7 @@ from .errors import (
 )
 from .exports.tables import export_motion
 from .integrator.machine_code import compile_steps
+from .inverse_design.design import Design, design
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
 from .phases.forced_split import ForcedSplit
@@ -70,7 +72,7 @@ from .phases.phases import (
 from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .phases.whole_turns import TurnCounts, turn_counts
-from .plots.viewer import view
+from .plots.pages.viewer import view
 from .reconstruction.external_torque import ExternalTorque, TorqueState
 from .reconstruction.forced_motion import ForcedMotion
 from .reconstruction.reconstruction import (
@@ -99,7 +101,6 @@ from .shape_space.connection import (
 from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path
 from .shape_space.files.write import write_shape_path
-from .shape_space.many_paths import FinalAttitudes, final_attitudes
 from .shape_space.path_noise import PathErrors, path_errors
 from .shape_space.reach.holonomy_algebra import Reach, reachable
 from .shape_space.reach.manipulators import dynamic_manipulability, generalised_jacobian, reaction_null_space
@@ -121,9 +122,9 @@ __all__ = [
     "Deformation",
     "DeformationFamily",
     "Derivatives",
+    "Design",
     "EulerTop",
     "ExternalTorque",
-    "FinalAttitudes",
     "FixedPoints",
     "FloatingTrajectory",
     "ForcedMotion",
@@ -180,6 +181,7 @@ __all__ = [
     "curvature_on_plane",
     "deformation",
     "derivatives",
+    "design",
     "dynamic_manipulability",
     "dynamic_phase_from_energy",
     "dynamics",
@@ -189,7 +191,6 @@ __all__ = [
     "examples",
     "export_motion",
     "exports",
-    "final_attitudes",
     "fixed_points",
     "free_hinges",
     "generalised_jacobian",
@@ -201,6 +202,7 @@ __all__ = [
     "in_gauge",
     "inertia_tensor",
     "integrator",
+    "inverse_design",
     "is_flat",
     "joint_torques",
     "link_gauge",

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, Protocol, TypeVar, dataclass_transform, overload
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, lock_arrays
 from .letters import printable, shortened
 
 MOST_LINES = 9  # of a `repr`
@@ -91,6 +91,33 @@ def short_repr(self: Any) -> str:
     if len(lines) >= MOST_LINES:
         lines = [*lines[: MOST_LINES - 2], "    …"]
     return "\n".join([*lines, ")"])
+
+
+_Kind = TypeVar("_Kind")
+
+
+@overload
+def frozen(kind: type[_Kind]) -> type[_Kind]: ...
+
+
+@overload
+def frozen(*, kw_only: bool) -> Callable[[type[_Kind]], type[_Kind]]: ...
+
+
+@dataclass_transform(eq_default=False, frozen_default=True, field_specifiers=(field,))
+def frozen(kind: Any = None, *, kw_only: bool = False) -> Any:
+    """Decorate a class whose objects nobody changes: a frozen dataclass, each equal to itself alone.
+
+    Objects show their arrays as read-only views and print by `short_repr`, unless the class has methods of its own.
+    """
+
+    def made(kind: Any) -> Any:
+        for name, method in (("__repr__", short_repr), ("__post_init__", lock_arrays)):
+            if name not in vars(kind):
+                setattr(kind, name, method)
+        return dataclass(frozen=True, eq=False, repr=False, kw_only=kw_only)(kind)
+
+    return made if kind is None else made(kind)
 
 
 def numbers(values: Any, unit: str = "") -> str:

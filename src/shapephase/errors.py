@@ -410,6 +410,29 @@ class UnreachableGoalError(PlanNotFound):
     """
 
 
+class DesignNotFound(ShapePhaseError, ArithmeticError):
+    """No member of a family of deformations was found that meets the goal.
+
+    Remedy: where `cover` shows that there is none, another goal, or a wider box; the message says how near the family
+    comes. Else also more members, or another start.
+
+    Attributes
+    ----------
+    best : `Design` of the nearest member, which misses the goal
+    cover : enclosures that exclude every member, a `Cover`; None where it is not known whether there is one
+
+    Examples
+    --------
+    >>> error = sp.errors.DesignNotFound("no member meets theta = 1 rad", best="the nearest member")
+    >>> print(error, "-", error.best)
+    no member meets theta = 1 rad - the nearest member
+    """
+
+    def __init__(self, message: str, best: object = None, cover: object = None) -> None:
+        super().__init__(message)
+        self.best, self.cover = best, cover
+
+
 class UnphysicalInertiaWarning(UserWarning):
     """Links whose inertia is doubtful, accepted because the caller allows it or because it does no harm.
 

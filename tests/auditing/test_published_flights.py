@@ -1,18 +1,18 @@
-"""Public trajectories with a flight: three somersaults that others have optimised (tests/data/trampoline)."""
+"""Public trajectories with a flight: three somersaults that others have optimised (robots/trampoline)."""
 
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import shapephase as sp
 from shapephase.errors import IgnoredElementWarning
+from support.places import ROBOTS
 
 pytestmark = pytest.mark.usefixtures("kept_locale")
-FLIGHTS = Path(__file__).parents[1] / "data" / "trampoline"
+FLIGHTS = ROBOTS / "trampoline"
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from shapephase import so3
 from shapephase.body import inertia_box
 from shapephase.body.drawing import limits
 from shapephase.errors import VisualWarning
-from support.bodies import BODIES, joint, link, random_shapes, urdf
+from support.bodies import EVERY_BODY, joint, link, random_shapes, urdf
 
 BOX_COLOUR, PLAIN = (0.337, 0.706, 0.914, 1.0), (0.72, 0.74, 0.78, 1.0)
 BASE = link("base", 3.0, [0.3, 0.5, 0.6])
@@ -90,7 +90,7 @@ def test_boxes_of_rods_plates_and_what_cannot_exist():
     assert np.isfinite(edges).all()
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_a_model_without_a_file_is_drawn_as_boxes_that_turn_as_heavily(name, rng):
     """The solids drawn, put where `link_pose` says, have the body's locked inertia and centre of mass."""
     path = sp.load_body(name).file
@@ -498,7 +498,7 @@ def test_the_meshes_of_an_mjcf_are_where_the_file_puts_them(tmp_path):
     np.testing.assert_allclose(ours, theirs, atol=2e-5, rtol=0)
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_every_moving_part_with_mass_is_shown(name):
     body = sp.load_body(name)
     with warnings.catch_warnings():

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase.body import example_file, robots_folder
 from shapephase.errors import ModelFileError, ShapeError, UnknownNameError, UnphysicalInertiaError
-from support.bodies import BODIES, joint, link, random_shapes, urdf
+from support.bodies import EVERY_BODY, joint, link, random_shapes, urdf
 from support.urdf_links import UrdfLinks
 
 RELATIVE = 1e-12
@@ -27,7 +27,7 @@ def file_of(name):
     return robots_folder() / f"{name}.urdf"
 
 
-@pytest.fixture(scope="session", params=BODIES)
+@pytest.fixture(scope="session", params=EVERY_BODY)
 def case(request):
     """A body and its tree."""
     return sp.load_body(request.param), UrdfLinks(file_of(request.param))
@@ -211,7 +211,7 @@ def rebased(text, turn, shift):
     return ElementTree.tostring(root, encoding="unicode")
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_another_base_frame_turns_the_answers_and_nothing_else(name, rng, load_urdf):
     """U9: I -> Q^T I Q, L_o -> Q^T L_o; where the base origin lies does not matter at all."""
     body, text = sp.load_body(name), file_of(name).read_text(encoding="utf-8-sig")

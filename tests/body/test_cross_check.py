@@ -17,7 +17,7 @@ from shapephase.body.formats.urdf import urdf_tree
 from shapephase.body.formats.xml_text import xml_tree
 from shapephase.body.link_tree import LinkTree
 from shapephase.errors import ModelFileError, ShapePhaseError
-from support.bodies import BODIES, joint, link, random_shapes, urdf
+from support.bodies import EVERY_BODY, joint, link, random_shapes, urdf
 from support.independent import turn, urdf_file
 from support.urdf_links import UrdfLinks
 
@@ -114,7 +114,7 @@ def tree_of(name) -> LinkTree:
     return urdf_tree(xml_tree(path.read_bytes(), str(path)))
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_the_library_s_own_numbers_are_those_of_the_definitions(name, rng):
     body, tree, truth = sp.load_body(name), tree_of(name), CheckedLinks(urdf_file(name))
     for shape in random_shapes(body, rng, 3):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
 
 import biorbd
 import numpy as np
@@ -11,10 +10,11 @@ import pytest
 
 import shapephase as sp
 from shapephase.errors import IgnoredElementWarning
+from support.places import ROBOTS
 
 # What is computed is the same with and without machine code, which is quicker.
 pytestmark = pytest.mark.usefixtures("kept_locale")
-FLIGHTS = Path(__file__).parents[1] / "data" / "trampoline"
+FLIGHTS = ROBOTS / "trampoline"
 MODEL = FLIGHTS / "Model_JeCh_15DoFs.bioMod"
 BASE = ("TransX", "TransY", "TransZ", "RotX", "RotY", "RotZ")
 

@@ -234,15 +234,7 @@ def test_ctrl_c_at_any_time_is_one_line_and_130(seed, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.fixture
-def ctrl_c_heard():
-    """As on a terminal: of what a shell runs in the background Ctrl-C is ignored, and with it of the tests."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.usefixtures("ctrl_c_heard")
+@pytest.mark.usefixtures("heard_ctrl_c")
 def test_ctrl_c_within_a_command(capfd, monkeypatch):
     def pressed(*_, **__):
         signal.raise_signal(signal.SIGINT)

@@ -14,7 +14,7 @@ import pytest
 import shapephase as sp
 from shapephase.cli.main import main
 from shapephase.phases.split_text import CLOSED_GAP
-from shapephase.plots import report_page
+from shapephase.plots.pages import report_page
 from support.independent import BODIES, body_of, random_loop, random_vector
 from support.long_runs import full_but
 from support.pages import page_data

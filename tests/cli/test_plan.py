@@ -167,6 +167,7 @@ def test_a_time_limit_ends_the_search_with_the_best_so_far(tmp_path, capsys):
     assert sp.read_shape_path(out, body).duration == 1.0
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_postures_on_the_way(tmp_path, capsys):
     """One by its joints, one of a motion file at its time; each is where the file has it."""
@@ -212,6 +213,7 @@ def test_a_motion_is_undone(tmp_path, capsys):
     assert np.allclose(data["uncertainty"]["final_attitude"], bars.final_attitude, rtol=1e-5)
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_a_motion_with_momentum_is_undone_at_a_time(tmp_path, capsys):
     """From a table of the joints alone; the table says that playing backwards does not undo."""
@@ -229,6 +231,7 @@ def test_a_motion_with_momentum_is_undone_at_a_time(tmp_path, capsys):
     assert worst > np.degrees(0.0099)
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_posture_and_attitude_of_a_motion_are_matched(tmp_path, capsys):
     body, turned, stored = sp.load_body("cat_two_halves"), np.array([0.1, 0.2, 0.0]), tmp_path / "motion.npz"

@@ -136,8 +136,8 @@ MEETINGS = {
 }
 
 
-@pytest.mark.parametrize("when", full_but([0.0, 0.25, 0.5, 0.7, 1.0, 1.999999, 2.0], 0.7, 1.999999))
-@pytest.mark.parametrize("motion", [still, turning])
+@pytest.mark.parametrize("when", full_but([0.0, 0.25, 0.5, 0.7, 1.0, 1.999999, 2.0], 0.7))
+@pytest.mark.parametrize("motion", full_but([still, turning], turning))
 @pytest.mark.parametrize("meeting", MEETINGS)
 def test_where_moments_meet_the_axes_go_straight_on(meeting, motion, when):
     """U = P R^T with one signed permutation P for all time, whatever the order of the moments."""
@@ -165,7 +165,7 @@ def test_frames_and_rates_of_a_clear_case():
     assert_rates(frames, np.linspace(0.03, 1.97, 50), 2e-3, 1e-10)
 
 
-@pytest.mark.parametrize("when", [-1.0, 0.0, 0.25, 0.5, 0.7, 0.75, 1.2, 1.25])
+@pytest.mark.parametrize("when", full_but([-1.0, 0.0, 0.25, 0.5, 0.7, 0.75, 1.2, 1.25], 0.0, 0.5, 0.7))
 def test_a_crossing_costs_no_more_than_a_clear_case(when):
     """Nothing is halved: four panels of 51 samples, and the choice at the start."""
     asked = []
@@ -197,7 +197,7 @@ def test_a_long_motion():
     np.testing.assert_allclose(frames(t)[1], np.broadcast_to(-1e-3 * X, (201, 3)), atol=1e-13, rtol=0)
 
 
-@pytest.mark.parametrize("gap", [1e-6, 1e-8, 1e-10, 3e-12, 1e-12])
+@pytest.mark.parametrize("gap", full_but([1e-6, 1e-8, 1e-10, 3e-12, 1e-12], 1e-6, 1e-12))
 def test_nearly_symmetric_bodies(gap):
     """The distinct axis does not suffer from what rounding leaves open about the other two."""
     asked = []
@@ -260,7 +260,7 @@ def avoided(e, when=0.7):
     return inertia
 
 
-@pytest.mark.parametrize("when", [0.0, 0.7, 1.0, 2.0])
+@pytest.mark.parametrize("when", full_but([0.0, 0.7, 1.0, 2.0], 0.7))
 @pytest.mark.parametrize(("e", "near_rate"), [(1e-1, 1e-9), (1e-2, 1e-8), (1e-4, 3e-5), (1e-6, 2e-3), (1e-8, 3e-2)])
 def test_an_avoided_crossing_turns_the_axes(e, near_rate, when):
     """What the axes lack, times the gap, is off the diagonal: next to nothing."""
@@ -332,7 +332,7 @@ def nearest_quarter(angle):
 
 
 @pytest.mark.parametrize("breaks", [(0.5, 1.5), (0.5, 0.7, 0.9, 1.1, 1.5)])
-@pytest.mark.parametrize("angle", [0.0, 0.3, 0.7, 1.0, 2.0, -0.4])
+@pytest.mark.parametrize("angle", full_but([0.0, 0.3, 0.7, 1.0, 2.0, -0.4], 0.7, 2.0))
 def test_two_moments_equal_over_an_interval(angle, breaks):
     """The frame turns uniformly about the distinct axis to the nearest of the equivalent frames."""
     deformation = prescribed(interval(about(Z, angle)), breaks)
@@ -379,7 +379,7 @@ def test_an_interval_of_equal_moments_in_a_turning_frame(angle, breaks, power):
         assert abs(about_axis.mean()) * (right - left) < np.pi / 4
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", full_but(range(6), 0))
 def test_an_interval_inside_a_panel(seed):
     """Axes that are the same before and after it are not turned in it, though there they could be any."""
     turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
@@ -532,7 +532,7 @@ def test_rigid_bodies(moments, frame):
         (1.2, 0.1, -0.4),
         (-0.2, 1.3, 0.7),
         (2.0, 1.0, 0.3),
-        *np.random.default_rng(1).normal(size=(12, 3)),
+        *np.random.default_rng(1).normal(size=(4, 3)),
     ],
 )
 def test_a_tilted_body_of_revolution(vector):
@@ -643,20 +643,16 @@ def jumping(when, power, angle=np.pi / 4):
     return inertia
 
 
-@pytest.mark.parametrize("power", [1, 2])
-@pytest.mark.parametrize("when", [0.9, 1.0])
-@pytest.mark.parametrize("angle", [0.3, np.pi / 4, 1.2])
-def test_axes_that_jump_at_a_break(when, power, angle):
+JUMPS = [*product([1, 2], [0.9, 1.0], [0.3, np.pi / 4, 1.2]), (1, 0.9, 0.01)]
+
+
+@pytest.mark.parametrize(("power", "when", "angle"), full_but(JUMPS, *JUMPS[1::4], JUMPS[-1]))
+def test_axes_that_jump_at_a_break(power, when, angle):
     with pytest.raises(GaugeError, match=f"jump by {abs(np.degrees(nearest_quarter(angle))):.3g} degrees") as caught:
         principal_frames(prescribed(jumping(when, power, angle), (when,)))
     assert said_time(caught.value) == when
     assert "horizontal gauge" in str(caught.value)
     assert "kg m^2" in str(caught.value)
-
-
-def test_axes_that_jump_a_little_at_a_break():
-    with pytest.raises(GaugeError, match="degrees"):
-        principal_frames(prescribed(jumping(0.9, 1, 0.01), (0.9,)))
 
 
 @pytest.mark.filterwarnings("ignore::shapephase.errors.UndeclaredBreakWarning")
@@ -768,8 +764,8 @@ def test_axes_that_turn_many_times(speed):
 # ---- Bodies ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-@pytest.mark.parametrize("name", ["satellite", "cat", "example:human", "astronaut"])
+@pytest.mark.parametrize("seed", full_but([0, 1, 2], 0))
+@pytest.mark.parametrize("name", full_but(["satellite", "cat", "example:human", "astronaut"], "satellite"))
 def test_bodies_along_random_loops(name, seed):
     body, rng = sp.load_body(name), np.random.default_rng(seed)
     deformation = sp.articulated(body, random_loop(body, rng, harmonics=3, duration=2.0, amplitude=0.6))

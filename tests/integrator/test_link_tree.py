@@ -1,4 +1,4 @@
-"""Inertia and momentum of a tree of links, and derivatives of the momentum: right to rounding, compiled or not."""
+"""Inertia and momentum of a tree of links: right to rounding, compiled or not."""
 
 from __future__ import annotations
 
@@ -9,15 +9,10 @@ import pytest
 from benchmarks.body_leaf import leaves
 
 import shapephase as sp
-from shapephase.body.inertial_regressor import by_link_parameters, link_motions
-from shapephase.body.momentum_gradients import by_independent, by_shape_and_rate
 from shapephase.errors import SingularInertiaError
 from shapephase.integrator.link_tree import (
-    inertial_sums,
-    momentum_gradients,
     tree_channels,
     tree_inertia_and_momentum,
-    trees_channels,
 )
 from support.bodies import joint, link, random_shapes, urdf
 from support.compiler import needs_compiler
@@ -54,35 +49,12 @@ def test_the_kernel_agrees_with_pinocchio(body, rng):
     assert np.allclose(channels[:, 6:], (inverse @ expected_momentum[..., None])[..., 0], rtol=0, atol=1e-11)
 
 
-def test_gradients_are_those_of_arrays(body, rng):
-    """Numbers of shapes that do not fill lanes; what hangs on joints is summed in another order."""
-    chain, count = body.chain, 11
-    shapes, rates = random_shapes(body, rng, count), rng.normal(size=(count, body.n_shape))
-    spins, rows = rng.normal(size=(count, 2, 3)), rng.normal(size=(count, 2, 4, 3))
-    of_all = momentum_gradients(chain.rows, shapes, rates, spins, rows)
-    links = link_motions(chain, shapes, rates)
-    expected = by_shape_and_rate(chain, links, shapes, rates, spins, rows)
-    for found, known in zip(by_independent(chain, *of_all, shapes, rates), expected, strict=True):
-        np.testing.assert_allclose(found, known, rtol=0, atol=2000 * EPS * np.abs(known).max(initial=0.0))
-    sums = chain.rows.in_chain_axes(inertial_sums(chain.rows, shapes, rates, spins, rows)).reshape(8, -1)
-    known = np.concatenate([by_link_parameters(links, rows[:, k], spins[:, k]) for k in range(2)])
-    np.testing.assert_allclose(sums, known, rtol=0, atol=2000 * EPS * np.abs(known).max())
-
-
 def test_interpreted_kernels_give_the_same_bits(monkeypatch, body, rng):
     shapes, rates = random_shapes(body, rng, 3), rng.normal(size=(3, body.n_shape))
     shapes[1] += 1e6
-    spins, rows = rng.normal(size=(3, 1, 3)), rng.normal(size=(3, 1, 2, 3))
-
-    def results():
-        tree = body.chain.rows
-        gradients = momentum_gradients(tree, shapes, rates, spins, rows)
-        return [tree_channels(tree, shapes, rates), *gradients, inertial_sums(tree, shapes, rates, spins, rows)]
-
-    compiled = results()
+    compiled = tree_channels(body.chain.rows, shapes, rates)
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    for interpreted, found in zip(results(), compiled, strict=True):
-        np.testing.assert_array_equal(interpreted, found)
+    np.testing.assert_array_equal(tree_channels(body.chain.rows, shapes, rates), compiled)
 
 
 def test_a_shape_s_result_does_not_depend_on_its_companions(body, rng):
@@ -90,20 +62,6 @@ def test_a_shape_s_result_does_not_depend_on_its_companions(body, rng):
     whole = tree_channels(body.chain.rows, shapes, rates)
     alone = [tree_channels(body.chain.rows, shapes[i : i + 1], rates[i : i + 1])[0] for i in range(19)]
     assert np.array_equal(whole, alone)
-
-
-def test_nor_does_a_tree_s_among_trees_of_other_masses(body, rng):
-    shapes, rates = random_shapes(body, rng, 9), rng.normal(size=(9, body.n_shape))
-    tree, factors = body.chain.rows, np.array([1.0, 0.5, 3.0])
-    rows = np.repeat(tree.rows[None], 3, axis=0)
-    rows[:, :, 12] *= factors[:, None]
-    rows[:, :, 16:] *= factors[:, None, None]
-    together, reliable = trees_channels(tree, rows, tree.mass * factors, shapes, rates)
-    assert reliable.all()
-    assert np.array_equal(together[0], tree_channels(tree, shapes, rates))
-    # I is proportional to all masses, I^-1 L_o does not know them.
-    np.testing.assert_allclose(together[:, :, :6] * factors[:, None, None], together[[0, 0, 0], :, :6], rtol=1e-10)
-    np.testing.assert_allclose(together[:, :, 6:], together[[0, 0, 0], :, 6:], rtol=0, atol=1e-11)
 
 
 def test_a_singular_body_is_left_to_code_that_names_it(monkeypatch, load_urdf):

@@ -9,10 +9,7 @@ from scipy.linalg import eigh
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.errors import ShapeError, UnknownNameError, UnreachableGoalError
 from shapephase.optimal_control import (
-    Goal,
-    Limits,
     Search,
     conjugate_times,
     extremal,
@@ -20,10 +17,8 @@ from shapephase.optimal_control import (
     plan_reorientation,
     shoot,
     small_loop,
-    symbolic_body,
     wong_residual,
 )
-from support.long_runs import full_but
 
 EPS = np.finfo(float).eps
 Z = np.array([0.0, 0.0, 1.0])

@@ -17,6 +17,7 @@ import shapephase as sp
 from shapephase.errors import UnknownNameError
 from support.independent import (
     BODIES,
+    EVERY_BODY,
     apart,
     body_of,
     geodesic_turn,
@@ -118,7 +119,7 @@ def test_phases_of_closed_orbits_are_those_of_parallel_transport(name: str, gaug
         assert split.geometric_phase == -split.solid_angle
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_any_attitude(name: str, seed: int):
     """U5, lift, holonomy and split: Delta R = exp(theta_M mu^) tilt R_G, without R_G in the base gauge.
@@ -251,7 +252,7 @@ def test_steady_turn_about_a_principal_axis():
 # ---- Gauges --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_the_rotation_and_its_holonomy_are_the_same_in_every_gauge(name: str):
     motion = some_motion(name)
     splits = [sp.split(motion, gauge) for gauge in ("horizontal", "base")]
@@ -453,7 +454,7 @@ def test_a_batch_is_split_like_its_members():
                 assert abs(getattr(split, field)[i, j] - getattr(single, field)) < 3e-11
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_the_angle_is_the_phase_in_one_turn(name: str):
     fast = sp.reconstruct(deformation_of(name), random_vector(1, 5.0 * BODIES[name]), tolerance=1e-9)
     for gauge in ("horizontal", "base"):
@@ -464,7 +465,7 @@ def test_the_angle_is_the_phase_in_one_turn(name: str):
         assert split.residual < 1e-9
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_the_dynamic_phase_lies_between_those_of_the_extreme_moments(name: str):
     """In the horizontal gauge theta_D = integral of u . I^-1 u: between |mu| T over the largest and least moment."""
     motion = some_motion(name)

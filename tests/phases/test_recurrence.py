@@ -14,7 +14,16 @@ from scipy.spatial import cKDTree
 import shapephase as sp
 from shapephase.errors import AccuracyNotReached, ShapeError
 from shapephase.phases import Crossings, momentum_crossings, momentum_returns
-from support.independent import BODIES, body_of, pinocchio_motion, random_loop, random_rotation, random_vector, wrapped
+from support.independent import (
+    BODIES,
+    EVERY_BODY,
+    body_of,
+    pinocchio_motion,
+    random_loop,
+    random_rotation,
+    random_vector,
+    wrapped,
+)
 from support.long_runs import full_but
 
 Array = NDArray[np.float64]
@@ -400,7 +409,7 @@ def brute_force(motion: sp.Motion, count: int) -> Array:
     return np.stack([times[i[hit]], times[j[hit]]], axis=1)
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_crossings_of_bodies_are_those_of_a_fine_polygon(name: str):
     motion = some_motion(name)
     found, expected = momentum_crossings(motion), brute_force(motion, 20001)

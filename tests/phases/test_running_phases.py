@@ -23,6 +23,7 @@ from shapephase.phases import arc_phases, dynamic_phase_from_energy, parallel_tr
 from support import independent
 from support.independent import (
     BODIES,
+    EVERY_BODY,
     FreeFloating,
     apart,
     body_of,
@@ -806,7 +807,7 @@ def test_ten_random_gauges(name):
 # ---- The dynamic phase from energies -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_the_dynamic_phase_of_links_in_motion(name):
     """D11 (Cabrera 2006, remark 3.7), summed over the links."""
     motion = some_motion(name)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 import shapephase as sp
 from shapephase import plots
 from shapephase.examples import MOTIONS, cat_righting, kane_scher
+from shapephase.rigid_body import geodesics
 from support.long_runs import full_but
 
 SIZES = ((5.8, 3.4), (7.0, 2.8), (8.0, 5.6))  # [in]: narrow, low, high
@@ -69,7 +70,12 @@ FIGURES = {
     "crown": lambda ax: plots.plot_crown(ax, crown()),
     "bounds": lambda ax: plots.plot_bounds(ax, sp.bounds.bounds(motion("cat"))),
     "conjugate_locus": lambda ax: plots.plot_conjugate_locus(ax, [3.0, 2.0, 1.0]),
-    "ellipsoid_locus": lambda ax: plots.plot_ellipsoid_locus(ax, 0.8),
+    "surface_locus": lambda ax: plots.plot_surface_locus(ax, geodesics.ellipsoid(0.8)),
+    "potential": lambda ax: plots.plot_potential(ax, [3.0, 2.0, 1.0]),
+    "first_return": lambda ax: plots.plot_first_return(ax, [3.0, 2.0, 1.0]),
+    "euler_angles": lambda ax: plots.plot_euler_angles(ax, [0.7, 0.9, 1.0]),
+    "elliptic_cylinders": lambda ax: plots.plot_elliptic_cylinders(ax, TOP),
+    "pendulum": lambda ax: plots.plot_pendulum(ax, TOP),
     "caustic": lambda ax: plots.plot_caustic(ax, [2.0, 2.0, 1.0], circles=8),
 }
 SOLID = ("caustic",)

@@ -14,15 +14,24 @@ from scipy.interpolate import CubicSpline
 from shapephase import so3
 from shapephase.cli.rigid_body.conjugate import conjugate_command
 from shapephase.errors import InputFileNotFoundError, ShapeError, UnknownNameError
-from shapephase.plots import column_axes, plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
+from shapephase.plots import (
+    column_axes,
+    plot_caustic,
+    plot_conjugate_locus,
+    plot_first_return,
+    plot_potential,
+    plot_surface_locus,
+)
 from shapephase.rigid_body.geodesics import (
     astroid,
     axisymmetric_metric,
     conjugate_locus,
     ellipsoid,
+    ellipsoid_period,
     left_invariant_metric,
     meridian_length,
     serret_andoyer_metric,
+    surface_of_metric,
 )
 
 MOMENTS = (3.0, 2.0, 1.0)
@@ -97,7 +106,7 @@ def test_given_momenta_are_marked_and_the_second_order_starts_on_the_other_side(
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_nearly_round_ellipsoid_shows_the_astroid(order):
     flattening = 1e-4
-    ax = plot_ellipsoid_locus(column_axes(), 1.0 - flattening, (order,))
+    ax = plot_surface_locus(column_axes(), ellipsoid(1.0 - flattening), (order,))
     x, y = curves(ax, f"order {order}: 4 cusps")[0]
     # An astroid: |x|^(2/3) + |y|^(2/3) is constant; the size grows with the order.
     radius = order * np.abs(astroid(1.0 - flattening, 0.0)[1] - np.pi)
@@ -109,8 +118,8 @@ def test_a_nearly_round_ellipsoid_shows_the_astroid(order):
 
 
 def test_the_ellipsoid_is_drawn_with_both_orders_and_geodesics_that_touch_the_first():
-    ax = plot_ellipsoid_locus(column_axes(), 0.5, geodesics=12)
-    assert labels(ax) == ["geodesics", "order 1: 4 cusps", "order 2: 4 cusps"]
+    ax = plot_surface_locus(column_axes(), ellipsoid(0.5), (1, 2), geodesics=12)
+    assert labels(ax) == ["geodesics", "order 1: 4 cusps", "order 2: 4 cusps", "cut locus: arc of a parallel"]
     assert ax.get_aspect() == 1.0
     x, y = curves(ax, "order 1: 4 cusps")[0]
     # The cusps on the equator: the equator's conjugate time is pi epsilon, so theta = pi/2 or, westward, 3 pi/2.
@@ -120,18 +129,83 @@ def test_the_ellipsoid_is_drawn_with_both_orders_and_geodesics_that_touch_the_fi
     for east, north in faint:
         assert np.hypot(x[:, None] - east, y[:, None] - north).min() < 0.02
     assert max(np.abs(east[0]) for east, _ in faint) == pytest.approx(np.pi, abs=1e-14)
-    for index, (_, north) in enumerate(faint):
-        # Clairaut: the parallel where a geodesic turns has the latitude of its direction at the start.
-        steepest = np.arcsin(np.sin(2.0 * np.pi * (index + 0.5) / 12))
-        assert abs(north.max() - abs(steepest)) < 1e-3
-        assert north[1] * steepest > 0.0
-    assert plot_ellipsoid_locus(column_axes(), 1.5, (1,), latitude=0.3, geodesics=0).lines
+    for east, north in faint:
+        # Clairaut: the parallel where a geodesic turns has the latitude of its direction at the start, where the
+        # meridian is half as long as the angle.
+        steepest = np.arctan2(0.5 * abs(north[1]), abs(east[1] - east[0]))
+        assert abs(north.max() - steepest) < 1e-3
+    assert {np.sign(north[1]) for _, north in faint} == {-1.0, 1.0}
+    assert plot_surface_locus(column_axes(), ellipsoid(1.5), latitude=0.3, geodesics=0).lines
+
+
+@pytest.mark.parametrize("aspect", [0.6, 1.4])
+def test_the_cut_locus_ends_in_the_cusps(aspect):
+    """An arc of the opposite parallel of an oblate ellipsoid, of the opposite meridian of a prolate one."""
+    kind = "parallel" if aspect < 1.0 else "meridian"
+    ax = plot_surface_locus(column_axes(), ellipsoid(aspect), latitude=0.2, geodesics=0)
+    ((x, y),) = curves(ax, f"cut locus: arc of a {kind}")
+    locus = curves(ax, "order 1: 4 cusps")[0]
+    axis = 0 if kind == "parallel" else 1
+    other = (x, y)[1 - axis]
+    assert other[0] == other[1]
+    assert [x, y][axis] == pytest.approx([locus[axis].min(), locus[axis].max()], abs=1e-3)
+
+
+def test_a_torus_has_two_branches_that_never_meet():
+    """Extremals of the outer half oscillate about its equator; the top, where m' = 0, is a separatrix."""
+
+    def torus(x):
+        return (2.0 + np.cos(x)) ** 2, -2.0 * np.sin(x) * (2.0 + np.cos(x))
+
+    surface = surface_of_metric(torus, np.pi)
+    ax = plot_surface_locus(column_axes(), surface, geodesics=4)
+    branches = curves(ax, "order 1: 2 cusps") + [line for line in curves(ax, "_") if len(line[0]) == 200]
+    assert len(branches) == 2
+    assert np.array_equal(branches[0][1], branches[1][1][::-1])
+    assert "cut locus" not in " ".join(labels(ax))
+    # On the outer equator the curvature is 1/3 and the circle has the radius 3: conjugate after pi sqrt(3).
+    for x, y in branches:
+        assert abs(x[np.abs(y).argmin()]) == pytest.approx(np.pi - np.pi * np.sqrt(3.0) / 3.0, abs=1e-3)
+
+
+def test_the_potential_is_one_where_extremals_turn():
+    ax = plot_potential(column_axes(), MOMENTS)
+    metric = serret_andoyer_metric(MOMENTS)
+    for p in (np.sqrt(2.0), np.sqrt(2.0) + 0.4 * (np.sqrt(3.0) - np.sqrt(2.0))):
+        ((phi, level),) = curves(ax, f"$p$ = {p:.4g}")
+        assert np.abs(level - metric.potential(phi, p)).max() < 1e-13
+        colour = next(line.get_color() for line in ax.lines if line.get_label() == f"$p$ = {p:.4g}")
+        (ends,) = [line.get_xdata() for line in ax.lines if line.get_marker() == "o" and line.get_color() == colour]
+        turning = metric.crest if p == np.sqrt(2.0) else float(metric.geodesics(p).amplitude)
+        # Next to the separatrix phi is as the square root of p.
+        assert ends == pytest.approx([-turning, turning], abs=1e-12 if p > 1.42 else 1e-6)
+    rotating = plot_potential(column_axes(), MOMENTS, [1.3])
+    assert not [line for line in rotating.lines if line.get_marker() == "o"]
+    ((_, level),) = curves(rotating, "$p$ = 1.3")
+    assert level.max() < 1.0
+    ((_, level),) = curves(plot_potential(column_axes(), ellipsoid(0.8), [0.5]), "$p$ = 0.5")
+    assert level.min() == pytest.approx(0.25, abs=1e-15)
+
+
+def test_period_and_first_return_are_those_of_the_closed_forms():
+    ax = plot_first_return(column_axes(), MOMENTS, TABLE[:, 0])
+    twin = ax.figure.axes[1]
+    metric = serret_andoyer_metric(MOMENTS)
+    for axes, column, closed in ((ax, 1, "period"), (twin, 2, "first_return")):
+        curve, marked = axes.lines
+        assert np.abs(marked.get_ydata() - TABLE[:, column]).max() < 1e-9
+        exact = getattr(metric.geodesics(curve.get_xdata()), closed)
+        assert np.abs(curve.get_ydata() / exact - 1.0).max() < 1e-11
+    assert labels(ax) == [r"period $T$ [$\sqrt{\mathrm{kg}}$ m]", "first return $R$ [rad]"]
+    ax = plot_first_return(column_axes(), ellipsoid(0.8))
+    (curve,) = ax.lines
+    assert curve.get_ydata() == pytest.approx(ellipsoid_period(0.8, curve.get_xdata()), rel=1e-14)
 
 
 @pytest.mark.parametrize(("aspect", "latitude"), [(0.5, 0.0), (1.5, 0.4)])
 def test_the_ordinate_is_the_parametric_latitude(aspect, latitude):
     """The meridian's length up to it, by the elliptic integral, is the phi of the conjugate points."""
-    x, y = curves(plot_ellipsoid_locus(column_axes(), aspect, (1,), latitude=latitude), "order 1: 4 cusps")[0]
+    x, y = curves(plot_surface_locus(column_axes(), ellipsoid(aspect), latitude=latitude), "order 1: 4 cusps")[0]
     points = conjugate_locus(ellipsoid(aspect), 400, 1, latitude).points
     phi = meridian_length(aspect, 0.5 * np.pi) - meridian_length(aspect, 0.5 * np.pi - y[:-1])
     assert np.abs(phi - points.latitude).max() < 1e-12
@@ -221,7 +295,12 @@ def test_figures_refuse_what_they_cannot_draw():
     flat, deep = column_axes(), column_axes(projection="3d")
     for draw in (
         lambda: plot_conjugate_locus(deep, MOMENTS),
-        lambda: plot_ellipsoid_locus(deep, 0.5),
+        lambda: plot_surface_locus(deep, ellipsoid(0.5)),
+        lambda: plot_surface_locus(flat, ellipsoid(0.5), latitude=2.0),
+        lambda: plot_potential(flat, ellipsoid(0.5), [1.1]),
+        lambda: plot_potential(deep, MOMENTS),
+        lambda: plot_first_return(flat, (2.0, 2.0, 1.0)),
+        lambda: plot_first_return(deep, MOMENTS),
         lambda: plot_caustic(flat, MOMENTS),
         lambda: plot_conjugate_locus(Figure(), MOMENTS),
         lambda: plot_conjugate_locus(flat, (3.0, 3.0, 1.0)),
@@ -229,9 +308,10 @@ def test_figures_refuse_what_they_cannot_draw():
         lambda: plot_conjugate_locus(flat, MOMENTS, momenta=[-1.5]),
         lambda: plot_conjugate_locus(flat, MOMENTS, momenta=[1.2]),
         lambda: plot_conjugate_locus(flat, MOMENTS, geodesics=-1),
-        lambda: plot_ellipsoid_locus(flat, 1.0),
-        lambda: plot_ellipsoid_locus(flat, 0.5, ()),
-        lambda: plot_ellipsoid_locus(flat, 0.5, geodesics=0.5),
+        lambda: plot_surface_locus(flat, ellipsoid(1.0)),
+        lambda: plot_surface_locus(flat, ellipsoid(0.5), ()),
+        lambda: plot_surface_locus(flat, ellipsoid(0.5), geodesics=0.5),
+        lambda: plot_first_return(flat, MOMENTS, [1.2]),
         lambda: plot_caustic(deep, MOMENTS, circles=1),
         lambda: plot_caustic(deep, (1.0, np.inf, np.inf)),
     ):

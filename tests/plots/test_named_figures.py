@@ -21,7 +21,7 @@ from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.examples import cat_righting, satellite_sweep
 from shapephase.plots import FIGURES, report, write_figure
 from shapephase.plots.pages.report_data import continued_rotation_vectors
-from shapephase.plots.report_page import figure_rows
+from shapephase.plots.pages.report_page import figure_rows
 from support.bodies import random_loop
 from support.browser import furred, opened, seen
 from support.long_runs import full_but

@@ -854,7 +854,8 @@ def test_every_figure_returns_its_axes_and_is_drawn_within_its_column(motions, c
         plots.plot_reach: (sp.reachable(sp.load_body("cat_two_halves")),),
     }
     elsewhere = ("polhodes", "herpolhode", "heavy_top_stability", "crown", "bounds")
-    elsewhere += ("caustic", "conjugate_locus", "ellipsoid_locus")
+    elsewhere += ("caustic", "conjugate_locus", "surface_locus", "potential", "first_return")
+    elsewhere += ("euler_angles", "elliptic_cylinders", "pendulum")
     elsewhere += ("cones", "rolling_ellipsoid")
     others = {getattr(plots, f"plot_{name}") for name in elsewhere}
     drawn = {getattr(plots, name) for name in plots.__all__ if name.startswith("plot_")}

@@ -9,7 +9,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.examples import cat_righting
-from shapephase.plots._report_text import joint_rows, torque_words
+from shapephase.plots.pages.report_text import joint_rows, torque_words
 
 
 def test_joints_that_give_out_what_they_take_back_do_no_work():

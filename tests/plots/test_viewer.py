@@ -18,7 +18,8 @@ from shapephase import so3
 from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
 from shapephase.errors import RunStopped, ShapeError, UnknownNameError, VisualWarning
 from shapephase.examples import cat_righting
-from shapephase.plots import moving_scene, report, view, viewer
+from shapephase.plots import moving_scene, report, view
+from shapephase.plots.pages import viewer
 from shapephase.plots.pages.motion_data import up_axis
 from support.bodies import link, random_loop, urdf
 from support.browser import furred, opened, seen, wait_for
@@ -491,7 +492,7 @@ def test_in_a_notebook_the_page_is_shown_in_the_cell(righting, monkeypatch):
     display = pytest.importorskip("IPython.display")
     shown = []
     monkeypatch.setattr(display, "display", shown.append)
-    monkeypatch.setattr("shapephase.plots.page._in_notebook", lambda: True)
+    monkeypatch.setattr("shapephase.plots.pages.page._in_notebook", lambda: True)
     page = view(righting, frames=5)
     assert page.show() is None
     assert shown == [page]
@@ -504,7 +505,7 @@ def test_a_report_is_stopped_by_its_progress_callback(righting):
 
 
 def test_only_pages_of_one_motion_are_filmed(righting, tmp_path, monkeypatch):
-    monkeypatch.setattr("shapephase.plots.page.check_video", lambda *_: ".gif")
+    monkeypatch.setattr("shapephase.plots.pages.page.check_video", lambda *_: ".gif")
     page = report(righting, sp.split(righting))
     with pytest.raises(ShapeError, match="rolling_ellipsoid"):
         page.film(tmp_path / "report.gif")

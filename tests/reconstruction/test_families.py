@@ -14,7 +14,7 @@ import shapephase as sp
 from shapephase.arrays import Array
 from shapephase.body.family import BodyFamily
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError, WrongObjectError
-from shapephase.integrator import families
+from shapephase.integrator import many_rotations
 from support.bodies import joint, link, urdf
 from support.compiler import needs_compiler
 from support.long_runs import full_but
@@ -181,8 +181,8 @@ def test_what_fails_is_named(load_urdf):
 
 
 def test_more_than_can_be_kept_is_refused(monkeypatch):
-    monkeypatch.setattr(families, "_MOST_KEPT", 10_000)
-    with pytest.raises(AccuracyNotReached, match="samples"):
+    monkeypatch.setattr(many_rotations, "_MOST_KEPT", 10_000)
+    with pytest.raises(AccuracyNotReached, match="take slices of the family"):
         sp.reconstruct(family(CAT, box=False), momentum_of(CAT))
 
 
@@ -249,5 +249,5 @@ def test_families_can_be_pickled_and_not_be_written_to():
     again = pickle.loads(pickle.dumps(motions))
     assert np.array_equal(again[1].attitude(0.5), motions[1].attitude(0.5))
     bodies = motions.deformations.bodies
-    for array in (bodies.masses, bodies.rows, motions.momentum, motions.initial_attitude):
+    for array in (bodies.masses, motions.momentum, motions.initial_attitude):
         assert not array.flags.writeable

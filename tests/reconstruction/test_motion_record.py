@@ -259,14 +259,9 @@ def test_every_array_is_needed(saved: Path, tmp_path):
         names = [name.removesuffix(".npy") for name in archive.namelist()]
     for name in names:
         where = rewritten(saved, tmp_path / "less.npz", **{name: None})
-        if name == "closure":  # without it the shape is open
-            assert not sp.split(sp.load_motion(where)).is_loop
-            continue
         if name in ("time", "shapes", "joint_names", "base_quat_xyzw"):  # those of the recording
-            assert sp.load_motion(where).duration == 2.0
             with pytest.raises(TrajectoryError, match=r"less\.npz.*path of its joints"):
                 sp.read_recorded_motion(where, body_of("cat_two_halves"))
-            continue
         with pytest.raises(ResultFileError, match=r"less\.npz"):
             sp.load_motion(where)
 
@@ -293,52 +288,23 @@ def test_a_batch_is_no_recording(tmp_path):
         sp.read_recorded_motion(tmp_path / "batch.npz", body_of("satellite"))
 
 
-def odd_entry(value):
-    """The same array with another first entry."""
-
-    def changed(array):
-        other = array.copy()
-        other.flat[0] = value
-        return other
-
-    return changed
-
-
-@pytest.mark.parametrize(
-    ("name", "change", "said"),
-    [
-        ("spatial_momentum", odd_entry(np.nan), "finite"),
-        ("initial_attitude", lambda a: 2.0 * a, "not a rotation"),
-        ("initial_attitude", lambda a: a[:2], "expected shape"),
-        ("closure", lambda a: -a, "not a rotation"),
-        ("breaks", lambda a: a[::-1], "breaks do not ascend"),
-        ("breaks", lambda a: 2.0 * a, "breaks end"),
-        ("centre", odd_entry(np.inf), "finite"),
-        ("edges", lambda a: np.zeros_like(a), "edges do not ascend"),
-        ("edges", lambda a: a[:-1], "expected shape"),
-        ("coefficients", odd_entry(np.nan), "finite"),
-        ("coefficients", lambda a: a[..., :8], "expected shape"),
-        ("coefficients", lambda a: a[:0], "no samples"),
-        ("step_steps", lambda a: -a, "one step or more"),
-        ("step_steps", lambda a: a.astype(float), "whole numbers"),
-        ("step_quaternions", lambda a: 0.0 * a, "length 1"),
-        ("step_quaternions", lambda a: a[:, :-1], "expected shape"),
-        ("step_directions", lambda a: a[:, 1:], "directions are needed"),
-        ("step_directions", lambda a: np.where(np.arange(a.size).reshape(a.shape) == 7, 1e308, a), "constant in space"),
-        ("step_directions", lambda a: a[:, ::-1], "constant in space"),
-        ("step_directions", lambda a: 0.9 * a, "length 1"),
-        ("step_dynamics", lambda a: a.astype(np.float32), "doubles"),
-        ("step_sampling_error", lambda a: a - 1.0, "below 0"),
-        ("perturbed", odd_entry(-np.inf), "finite"),
-        ("hidden", lambda a: a[None], "doubles"),
-    ],
-)
-def test_arrays_that_no_motion_has(saved: Path, tmp_path, name: str, change, said: str):
+@pytest.mark.parametrize("name", ["spatial_momentum", "closure", "coefficients", "step_quaternions", "hidden"])
+def test_a_changed_number_is_noticed(saved: Path, tmp_path, name: str):
+    """The last bit of one number."""
     with np.load(saved) as stored:
-        array = change(stored[name])
+        array = stored[name]
+    array.flat[0] = np.nextafter(array.flat[0], np.inf)
     where = rewritten(saved, tmp_path / "odd.npz", **{name: array})
-    with pytest.raises(ResultFileError, match=rf"odd\.npz: the motion's numbers cannot be used \(.*{said}"):
+    with pytest.raises(ResultFileError, match=r"odd\.npz: the motion is damaged"):
         sp.load_motion(where)
+
+
+def test_a_file_of_an_earlier_version_has_no_digest(saved: Path, tmp_path):
+    with np.load(saved) as stored:
+        header = json.loads(str(stored["header"]))
+    del header["digest"]
+    where = rewritten(saved, tmp_path / "old.npz", header=np.array(json.dumps(header)))
+    assert np.array_equal(sp.load_motion(where).attitude(TIMES), sp.load_motion(saved).attitude(TIMES))
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ import shapephase as sp
 from shapephase.errors import TrajectoryError
 from support.independent import (
     BODIES,
+    EVERY_BODY,
     FourierLoop,
     apart,
     axisymmetric_attitude,
@@ -45,8 +46,9 @@ UP = np.array([0.0, 0.0, 1.0])
 # Besides one Fourier loop for every body: the other kinds of paths, and one so long that its steps take another route.
 KINDS = ("spline", "open spline", "waypoints", "function", "long", "fast")
 CASES = (*BODIES, *KINDS)
-# The long path takes as long as all others together; differences show it right in the quick run.
-QUICK = tuple(case for case in CASES if case != "long")
+# Bodies and paths that differ in more than numbers.
+QUICK = ("example:human", "cat_two_halves", "satellite", "open spline", "waypoints", "fast")
+EVERY_CASE = full_but(CASES, *QUICK)
 
 
 def path_of(kind: str, joints: int, seed: int) -> sp.ShapePath:
@@ -135,13 +137,13 @@ def check_differences(motion: sp.Motion, scale: float, step: float) -> None:
 # ---- Sensitivity: differences of whole motions ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("case", full_but(CASES, *(case for case in CASES if case != "long")))
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_sensitivity_is_the_limit_of_differences(case: str):
     motion = motion_of(case)
     check_differences(motion, momentum_scale(case), 4e-3 / np.linalg.norm(motion.sensitivity.by_attitude))
 
 
-@pytest.mark.parametrize("case", full_but(CASES, *QUICK))
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_sensitivity_without_momentum(case: str):
     """Another route: by_momentum is then the integral of S I^-1 S^T, and a turned start is a turned end."""
     motion = motion_of(case, moving=False)
@@ -150,8 +152,8 @@ def test_sensitivity_without_momentum(case: str):
     np.testing.assert_allclose(motion.sensitivity.by_attitude, there.T, rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9])
-@pytest.mark.parametrize("case", full_but(CASES, *QUICK))
+@pytest.mark.parametrize("tolerance", full_but([1e-4, 1e-6, 1e-9], 1e-4, 1e-9))
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_sensitivity_is_as_good_as_the_motion(case: str, tolerance: float):
     tight = motion_of(case)
     loose = sp.reconstruct(tight.deformation, tight.momentum, tight.initial_attitude, tolerance=tolerance)
@@ -239,7 +241,7 @@ def test_sensitivity_and_amplification_of_the_symmetric_top(across: float, along
 
 
 @pytest.mark.parametrize("moving", [True, False])
-@pytest.mark.parametrize("case", full_but(CASES, *QUICK))
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_turning_momentum_and_start_turns_the_whole_motion(case: str, moving: bool):
     """Inertial axes are a choice: by_momentum (xi x mu) + by_attitude R(0)^T xi = R(T)^T xi for every xi."""
     motion = motion_of(case, moving=moving)
@@ -250,7 +252,7 @@ def test_turning_momentum_and_start_turns_the_whole_motion(case: str, moving: bo
         assert np.linalg.norm(moved - motion.final_attitude.T @ xi) < EXACT * size
 
 
-@pytest.mark.parametrize("case", full_but(CASES, *QUICK))
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_a_turn_about_the_momentum_stays_one(case: str):
     motion = motion_of(case)
     carried = motion.sensitivity.by_attitude @ motion.body_momentum(0.0)
@@ -259,7 +261,7 @@ def test_a_turn_about_the_momentum_stays_one(case: str):
 
 
 @pytest.mark.parametrize("share", full_but([1.0, 1e-2, 1e-4, 0.0], 1.0, 0.0))
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_sensitivity_of_two_motions_one_after_the_other(name: str, share: float):
     """by_attitude is the product, by_momentum that of the second part and the first one's carried through it.
 
@@ -306,7 +308,7 @@ def largest_growth(motion: sp.Motion) -> Array:
     return np.linalg.svd(motion.sensitivity.by_attitude, compute_uv=False)[..., 0]
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_amplification_covers_the_growth_to_the_end(case: str):
     motion = motion_of(case)
     assert motion.amplification >= max(1.0, 0.95 * largest_growth(motion))
@@ -399,7 +401,7 @@ def modulo_sphere(area: Array) -> Array:
     return 2.0 * np.angle(np.exp(0.5j * np.asarray(area)))
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_dynamic_phase_is_the_integral_of_the_rate_about_the_momentum(case: str):
     edges, weights, unit, omega = curve_of(case)
     truth = running(weights, np.sum(unit * omega, axis=-1))
@@ -408,7 +410,7 @@ def test_dynamic_phase_is_the_integral_of_the_rate_about_the_momentum(case: str)
     assert np.abs(found - truth).max() < PHASE
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_solid_angle_is_the_area_of_the_momentum_curve(case: str):
     """Modulo the sphere, with the reference, of many, that the curve's opposite keeps farthest from."""
     edges, _, unit, _ = curve_of(case)
@@ -422,7 +424,7 @@ def test_solid_angle_is_the_area_of_the_momentum_curve(case: str):
     assert np.abs(modulo_sphere(found - truth)).max() < PHASE
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_phases_turn_the_start_into_the_attitude(case: str):
     """R(t) R(0)^T = exp((dynamic_phase - solid_angle) mu^) tilt(t), the great circle from Pi(t) back to Pi(0)."""
     check_reading(motion_of(case), 1e-12)
@@ -449,7 +451,7 @@ def test_phases_at_the_end_of_a_step_are_free_of_the_errors_between_steps():
     assert motion.solid_angle(0.0) == 0.0
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EVERY_CASE)
 def test_phases_end_as_those_of_the_split(case: str):
     motion = motion_of(case)
     split, end = sp.split(motion, "base"), [motion.duration]
@@ -457,8 +459,8 @@ def test_phases_end_as_those_of_the_split(case: str):
     assert abs(modulo_sphere(motion.solid_angle(end)[0] - split.solid_angle)) < PHASE
 
 
-@pytest.mark.parametrize("size", [0.1, 0.3])
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("size", full_but([0.1, 0.3], 0.3))
+@pytest.mark.parametrize("name", EVERY_BODY)
 def test_solid_angle_grows_continuously(name: str, size: float):
     """Not only modulo the sphere: seen from the start itself, while the curve keeps away from the start's opposite."""
     motion = sp.reconstruct(

@@ -21,9 +21,11 @@ from shapephase.segments import shapley_interactions, shapley_values
 from support.ball_bodies import BALLS
 from support.bodies import joint, link, random_loop, urdf
 from support.coupled_bodies import LEG, TURN, couplings
+from support.long_runs import full_but
+from support.places import ROBOTS
 from support.random_chains import random_chain
 
-FLIGHTS = Path(__file__).parents[1] / "data" / "trampoline"
+FLIGHTS = ROBOTS / "trampoline"
 AXES = {"lateral": "y", "longitudinal": "z", "somersault": "y", "up": "z"}
 TURNS = 2.0 * np.pi
 
@@ -117,11 +119,12 @@ def random_path(body, rng):
     return of_fourier(mean, *(rng.uniform(-0.2, 0.2, (2, body.n_shape, 2))), body.joint_names, 1.5)
 
 
-def test_direct_shares_sum_to_the_angle_on_200_random_motions(tmp_path):
+@pytest.mark.parametrize("motions", full_but([40, 200], 40))
+def test_direct_shares_sum_to_the_angle_on_random_motions(motions, tmp_path):
     rng = np.random.default_rng(56)
     bodies, count, worst = random_bodies(tmp_path), 0, 0.0
-    for number in range(400):
-        if count == 200:
+    for number in range(2 * motions):
+        if count == motions:
             break
         body = bodies[number % len(bodies)]
         path = random_path(body, rng)
@@ -142,7 +145,7 @@ def test_direct_shares_sum_to_the_angle_on_200_random_motions(tmp_path):
         assert direct.error.max() < 1e-5
         assert direct.total == pytest.approx(direct.shares[1 if of == "tilt" else 2], abs=1e-12)
         worst, count = max(worst, gap.max()), count + 1
-    assert count == 200
+    assert count == motions
     assert worst < 1e-8
 
 
@@ -185,14 +188,15 @@ def rerooted(text, root):
 
 
 @pytest.mark.filterwarnings("ignore::shapephase.ImplausibleBodyWarning")
-def test_shares_of_a_link_do_not_depend_on_the_root(tmp_path):
+@pytest.mark.parametrize("every", full_but([1, 5], 5))
+def test_shares_of_a_link_do_not_depend_on_the_root(every, tmp_path):
     """The angular velocity of the base itself differs; shares of the angles of the front half do not."""
     text = Path("robots/cat.urdf").read_text()
     cat = sp.load_body("cat")
     path, momentum = sp.examples.cat_righting(), np.array([0.01, 0.03, -0.02])
     axes = {"lateral": [0.0, 1.0, 0.0], "longitudinal": [1.0, 0.0, 0.0], "somersault": "y", "up": "z"}
     known = None
-    for root in [part.links[0] for part in cat.moving_parts if part.mass > 0.0]:
+    for root in [part.links[0] for part in cat.moving_parts if part.mass > 0.0][::every]:
         body = loaded(tmp_path, rerooted(text, root))
         assert body.link_names[0] == root
         start = cat.link_pose(path.shape(0.0), root)[:3, :3]

@@ -72,7 +72,7 @@ def test_limbs_of_bodies_that_ship():
 
 @pytest.mark.filterwarnings("ignore::shapephase.IgnoredElementWarning")
 def test_pairs_without_words_for_sides_are_told_by_geometry():
-    jumper = joint_groups(sp.load_body("tests/data/trampoline/Model_JeCh_15DoFs.bioMod"))
+    jumper = joint_groups(sp.load_body("robots/trampoline/Model_JeCh_15DoFs.bioMod"))
     assert jumper.pairs == {"arms": ("BrasD", "BrasG")}
     assert jumper.joints["Thorax"] == ("Thorax",)
     assert len(jumper.columns["Thorax"]) == 3

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from importlib.util import find_spec
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -24,8 +23,9 @@ from support.engine_files import ACROBAT
 from support.flown_bodies import flown, noisy
 from support.independent import BODIES, body_of, mujoco_model, random_loop, random_rotation, random_vector
 from support.long_runs import full_but
+from support.places import ROBOTS
 
-TRAMPOLINE = Path(__file__).parents[1] / "data" / "trampoline"
+TRAMPOLINE = ROBOTS / "trampoline"
 
 
 def motion_of(name: str) -> sp.Motion:

@@ -10,7 +10,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from distributed import Client, LocalCluster
 
 import shapephase as sp
 from shapephase import study as room
@@ -30,6 +29,8 @@ IN_FLIGHT = max(FEWEST_TASKS, 2 * TASKS_PER_THREAD)
 @pytest.mark.filterwarnings("ignore")
 def test_a_local_cluster_gives_the_same_and_its_workers_survive_poison(tmp_path):
     grid = [0.0, POISON, 0.0, 3 * POISON, 0.0]
+    from distributed import Client, LocalCluster
+
     study = room.Study(
         "cat_two_halves", bend, {"momentum_x": grid}, (room.Output("turned", poisoned),), chunk=2,
         parameters={"depth": 0.5},

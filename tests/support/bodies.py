@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import shapephase as sp
+from support.long_runs import full_but
 
 BODIES = (*sp.robot_names(), "example:human")
+# For a test: few joints and many, slides and wheels, welded links; the other bodies differ from these in numbers only.
+EVERY_BODY = full_but(BODIES, "cat_two_halves", "satellite", "astronaut_suited", "example:human")
 
 
 def random_shapes(body, rng, count):

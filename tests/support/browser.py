@@ -14,20 +14,26 @@ _NEVER = 180_000.0
 CHROMIUM_FLAGS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
-@pytest.fixture
-def chromium():
-    """A headless browser without a network, where there is one."""
+@pytest.fixture(scope="module")
+def _browser():
+    """A headless browser, where there is one, for all tests of a file: to start it takes two seconds."""
     found = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     if not found:
         pytest.skip("no Chromium on this machine; install it, or name it in the environment variable CHROMIUM")
     playwright = pytest.importorskip("playwright.sync_api", reason="driving a browser needs the package playwright")
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=found, args=list(CHROMIUM_FLAGS))
-        context = browser.new_context(offline=True, viewport={"width": 400, "height": 320})
-        context.set_default_timeout(_NEVER)
-        yield context
-        context.close()
+        yield browser
         browser.close()
+
+
+@pytest.fixture
+def chromium(_browser):
+    """A window of the browser, without a network, of which other tests know nothing."""
+    context = _browser.new_context(offline=True, viewport={"width": 400, "height": 320})
+    context.set_default_timeout(_NEVER)
+    yield context
+    context.close()
 
 
 def opened(chromium, file):

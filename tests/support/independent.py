@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.body.catalog import example_file
+from support.long_runs import full_but
 from support.places import ROBOTS
 
 if TYPE_CHECKING:
@@ -47,6 +48,8 @@ BODIES = {
     "diver": 10.0,
     "satellite": 12.0,
 }
+EVERY_BODY = full_but(BODIES, "example:human", "cat_two_halves", "satellite")
+"""Parameters of a test; the other bodies differ from these in numbers only."""
 
 
 class JointMotion(Protocol):

@@ -11,7 +11,7 @@ import inspect
 import json
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +124,6 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "contributions": lambda: sp.contributions(motion, "rotation", groups="joints"),
         "segment_momentum": lambda: sp.segment_momentum(motion),
         "clearance": lambda: sp.clearance(DIVER, SWING).approaches,
-        "final_attitudes": lambda: sp.final_attitudes(body, [path, path.reversed()], MOMENTUM),
         "horizontal_gauge": lambda: sp.reconstruct(sp.horizontal_gauge(deformation), MOMENTUM),
         "link_gauge": lambda: sp.link_gauge(deformation, given["link"]).inertia(TIMES),
         "mean_body_gauge": lambda: sp.mean_body_gauge(deformation).inertia(TIMES),
@@ -221,6 +220,8 @@ def numbers(thing: Any, depth: int = 0) -> list[Any]:
         return [repr(thing)]
     if isinstance(thing, tuple | list):
         return [number for part in thing for number in numbers(part, depth)]
+    if isinstance(thing, Mapping):
+        return numbers(list(thing.items()), depth)
     if isinstance(thing, sp.Motion):
         return [thing.attitude(TIMES), thing.final_attitude, thing.error_estimate]
     if isinstance(thing, sp.Deformation | sp.ShapePath):

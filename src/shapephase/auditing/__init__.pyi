@@ -1,12 +1,10 @@
 from ._airborne import AirbornePart
 from ._consistency import RateAgreement
 from ._engine_faults import StepOrder
-from ._noise import TrajectoryNoise
-from ._smooth_part import SmoothPart, smooth_part
 from .audit_result import Audit, RunAudit
 from .figures import audit_figure, write_audit_figure
 from .flight_recorder import FlightRecorder, assert_right_in_flight
-from .floating_trajectory import FloatingTrajectory
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise
 from .hypothesis import FittedValue, Hypothesis
 from .page import audit_page
 from .reading import read_trajectory
@@ -21,7 +19,6 @@ __all__ = [
     "Hypothesis",
     "RateAgreement",
     "RunAudit",
-    "SmoothPart",
     "StepOrder",
     "TrajectoryNoise",
     "assert_right_in_flight",
@@ -29,6 +26,5 @@ __all__ = [
     "audit_figure",
     "audit_page",
     "read_trajectory",
-    "smooth_part",
     "write_audit_figure",
 ]

@@ -16,7 +16,7 @@ from ..errors import ShapeError, TrajectoryError
 from ..letters import value_text
 from ..shape_space.files.flight import flight_choices
 from ..shape_space.free_fall import free_fall
-from ._noise import white_noise
+from ..shape_space.path_noise import white_noise
 from .floating_trajectory import FloatingTrajectory
 
 _GRAVITY = 9.81  # [m/s^2]

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array
-from ..display import short_repr
-from ._noise import TrajectoryNoise
+from ..display import frozen
 from ._observation import REACH, difference_weights, differentiated, fewer_neighbours, turn_rates
 from ._smooth_part import smooth_part
-from .floating_trajectory import FloatingTrajectory
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise
 
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of a rate or coordinate: rounding of 32 operations
 
@@ -19,7 +18,7 @@ _LEAST = 1e-150  # [rad/s or m/s] Noise of what never moves, whose square is a n
 _HELD = 2.0 / 12.0  # of squared step times jerk: torques held over a step shift rates by half a step
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class RateAgreement:
     """How far the given rates are from those that attitudes, places and joints have.
 
@@ -46,8 +45,6 @@ class RateAgreement:
     late: float
     mismatch_less_late: float
     colour: float = 1.0
-
-    __repr__ = short_repr
 
 
 def rate_agreement(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> RateAgreement | None:

@@ -15,8 +15,9 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from ..arrays import Array
-from ._noise import TrajectoryNoise, continuous, estimated_noise, white_noise
-from .floating_trajectory import FloatingTrajectory
+from ..reconstruction.attitude_angles import continuous
+from ..shape_space.path_noise import white_noise
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise, estimated_noise
 from .hypothesis import FittedValue, Hypothesis, milliseconds
 
 _ORDER = 6  # of differences: a motion of 11 rad/s at every 20 ms keeps 1e-4 of itself

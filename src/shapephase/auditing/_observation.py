@@ -15,8 +15,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
-from ._noise import TrajectoryNoise, estimated_noise
-from .floating_trajectory import FloatingTrajectory
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise, estimated_noise
 
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of a momentum or place: rounding of 32 operations
 _AT_REST = 1e-6  # rad: a body that turns by less in all the time is at rest

@@ -12,11 +12,10 @@ from scipy.interpolate import UnivariateSpline
 from ..arrays import Array
 from ..body.body import Body
 from ..warning_filters import quiet
-from ._noise import TrajectoryNoise
 from ._observation import observed
 from ._residuals import Residuals, fitted_hypothesis, leftover, leftover_of_moments, residuals
 from ._smooth_part import cut_off
-from .floating_trajectory import FloatingTrajectory
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise
 from .hypothesis import FittedValue, Hypothesis, Leftover
 
 _STEPS = 8  # of Gauss and Newton, for a time

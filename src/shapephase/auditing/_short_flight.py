@@ -16,10 +16,9 @@ from ..shape_space.free_fall import centre_noise, measured_fall
 from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
 from ._airborne import AirbornePart
-from ._noise import TrajectoryNoise, estimated_noise
 from ._smooth_part import smooth_part
 from .audit_result import RunAudit
-from .floating_trajectory import FloatingTrajectory
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise, estimated_noise
 
 TOLD_APART = 24
 """Samples from which on rates by differences of samples say what noise has, and causes can be told apart."""

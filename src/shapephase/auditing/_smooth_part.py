@@ -6,7 +6,7 @@ hold nearly all of the first and little of the second.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -14,9 +14,8 @@ from scipy.fft import dct
 from scipy.special import digamma
 from scipy.stats import f
 
-from ..arguments import check_pair, whole_argument
-from ..arrays import Array, Mask, finite_array
-from ..display import short_repr
+from ..arrays import Array, Mask
+from ..display import frozen
 
 _HIGHEST = 12  # order of the polynomials, the samples allowing
 _SAMPLES_EACH = 3  # samples that a polynomial needs
@@ -24,13 +23,8 @@ _UNSURE = 1.5  # factor of a variance: the noise is itself estimated
 _MOST_NOISE = 0.05  # of what residuals are of: samples of noise of 3 degrees, or worse, tell nothing
 _CHANCE = 1e-6  # probability with which noise alone is taken for something else, for one residual
 _MEMORIES = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99])  # from sample to sample
-_SHARPNESS = (
-    2,
-    3,
-    4,
-    6,
-    8,
-)  # half the powers by which Butterworth filters of two to four poles fall, used once or twice
+# Half the powers by which Butterworth filters of two to four poles fall, used once or twice.
+_SHARPNESS = (2, 3, 4, 6, 8)
 _ROUNDS = 12  # of Fisher's scoring, each of which gains about two digits of an amplitude
 _PLATEAU = 1.5  # lowest cut-off in units of the slow part's highest order: a third of the plateau has to be seen
 _LEAKAGE = 1e-4  # of the largest power: cosines of noise that does not end where it begins
@@ -40,7 +34,7 @@ _FEWEST_ORDERS = 5.0  # of a plateau
 _UNLIKE = 2.0  # mean deviance in units of that of noise; 1.3 is exceeded by chance in a thousand with 30 orders
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class SmoothPart:
     """What the first polynomials take of residuals.
 
@@ -51,13 +45,6 @@ class SmoothPart:
     noise : what noise alone brings to the values, rms
     colour : mean power of the noise over that of white noise with its highest frequencies
     least : (N,) the slowest curve that is not free, as large as it has to be along every axis to exceed noise
-
-    Examples
-    --------
-    >>> rest = np.zeros((40, 3))
-    >>> found = sp.auditing.smooth_part(np.linspace(0.0, 1.0, 40), rest, np.tile(np.eye(3), (40, 1, 1)), 1)
-    >>> print(found.ratio)
-    0.0
     """
 
     values: Array
@@ -65,8 +52,6 @@ class SmoothPart:
     noise: float
     colour: float = 1.0
     least: Array = field(default_factory=lambda: np.zeros(0), repr=False)
-
-    __repr__ = short_repr
 
 
 def polynomials(times: Array, highest: int) -> Array:
@@ -93,24 +78,15 @@ def smooth_part(
         to all that come after it, (N, k, m)
     whitened : (N, c) residuals in units of white noise, by which the spectrum of the noise is known; None: it is white
     size : of what the residuals are of, in their unit: what is above their slow part is noise up to a twentieth of it
-
-    Examples
-    --------
-    >>> times, noise = np.linspace(0.0, 1.0, 40), np.tile(1e-4 * np.eye(1), (40, 1, 1))
-    >>> drift = sp.auditing.smooth_part(times, times[:, None] ** 2, noise, 1)
-    >>> drift.ratio > 1.0  # more than noise of 0.01
-    True
     """
-    lowest = whole_argument(free, "free", 0)
-    highest = int(min(_HIGHEST, max(lowest, len(times) // _SAMPLES_EACH)))
-    basis = polynomials(times, highest)[:, lowest:]
+    highest = min(_HIGHEST, max(free, len(times) // _SAMPLES_EACH))
+    basis = polynomials(times, highest)[:, free:]
     parts = basis.T @ residuals
     # Noise that is independent from sample to sample.
     if carried is None:
         spread = np.einsum("np,nq,nij->piqj", basis, basis, covariances)
     else:
-        check_pair(carried, "carried", "two arrays")
-        own, further = (finite_array(part, "carried", (*residuals.shape, None)) for part in carried)
+        own, further = carried
         after = np.cumsum(basis[::-1], axis=0)[::-1] - basis
         of_each = np.einsum("np,nim->npim", basis, own) + np.einsum("np,nim->npim", after, further)
         spread = np.einsum("npim,nqjm->piqj", of_each, of_each)
@@ -123,7 +99,7 @@ def smooth_part(
         # Numbers that the power of the noise is known from (Satterthwaite 1946).
         above = power[highest + 1 :]
         known = whitened.shape[1] * above.sum() ** 2 / (above**2).sum()
-    deviations = np.sqrt(power[lowest : highest + 1])
+    deviations = np.sqrt(power[free : highest + 1])
     spread = spread * deviations[:, None, None, None] * deviations[None, None, :, None]
     count = parts.size
     matrix = spread.reshape(count, count)

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array
-from ..display import short_repr
+from ..display import frozen
 from ._airborne import AirbornePart
 from ._consistency import RateAgreement
 from ._engine_faults import StepOrder
-from ._noise import TrajectoryNoise
+from .floating_trajectory import TrajectoryNoise
 from .hypothesis import EXPLAINS, Hypothesis, milliseconds, percent
 
 _MOST_SHOWN = 8  # hypotheses in a table
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class RunAudit:
     """What was found of one run.
 
@@ -82,8 +82,6 @@ class RunAudit:
     momentum_bars: tuple[float, float, float] | None = None
     fall_bar: float | None = None
     least_drift: float = 0.0
-
-    __repr__ = short_repr
 
     @property
     def decided(self) -> bool:
@@ -149,7 +147,7 @@ class RunAudit:
         }
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class Audit:
     """What an audit has found.
 
@@ -179,8 +177,6 @@ class Audit:
     cause: tuple[Hypothesis, ...]
     step_order: StepOrder | None
     notes: tuple[str, ...]
-
-    __repr__ = short_repr
 
     @property
     def right(self) -> bool:

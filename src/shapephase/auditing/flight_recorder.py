@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_choice, check_object, number_argument
+from ..arguments import check_choice, number_argument
 from ..arrays import Array, real_array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..errors import ShapeError, TrajectoryError
 from .audit_result import Audit
 from .floating_trajectory import FloatingTrajectory
@@ -40,13 +41,13 @@ class FlightRecorder:
 
     def __init__(
         self,
-        body: Body,
+        body: Body | str,
         convention: str = "mujoco",
         *,
         joint_names: Sequence[str] | None = None,
         integrator_step: float | None = None,
     ) -> None:
-        check_object(body, "Body", "body")
+        body = as_body(body)
         check_choice(convention, "convention", CONVENTIONS)
         self.body = body
         self.convention = convention
@@ -99,7 +100,7 @@ def _row(value: ArrayLike, name: str) -> Array:
 
 
 def assert_right_in_flight(
-    body: Body,
+    body: Body | str,
     trajectories: FloatingTrajectory | Sequence[FloatingTrajectory],
     *,
     tolerance: float = 1e-3,

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_choice, check_object, names_argument, positive_argument
+from ..arguments import check_choice, made_by, names_argument, positive_argument
 from ..arrays import FARTHEST, Array, finite_array
 from ..body.body import Body
 from ..body.joint_orders import WORDS
-from ..display import short_repr
+from ..body.loading import as_body
+from ..display import frozen, short_repr
 from ..errors import ShapeError, TrajectoryError
+from ..reconstruction.attitude_angles import continuous
 from ..shape_space.files.formats.floating_arrays import MUJOCO_QPOS, PINOCCHIO_Q, FreeJoint, with_free_joint
 from ..shape_space.files.recording import Rates
-
-if TYPE_CHECKING:
-    from ._noise import TrajectoryNoise
+from ..shape_space.path_noise import white_noise
 
 FRAMES = ("world", "base")
 _FEWEST = 8  # samples: a flight of 0.3 s at 30 frames a second; fewer say nothing of noise
@@ -29,7 +29,37 @@ _OF_JOINTS = ("shapes", "joint_rates")  # what is read up to `FARTHEST`, as by a
 _OFF_UNIT = 0.1  # what is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@made_by("auditing.TrajectoryNoise(attitude=0.002), for example")
+@dataclass(frozen=True, kw_only=True)
+class TrajectoryNoise:
+    """Standard deviations of the samples, each about each axis or of each joint alike.
+
+    Attributes
+    ----------
+    attitude : of the base [rad]
+    position : of its origin [m]
+    joints : [rad or m], one for each
+    rate : of the base's angular velocity [rad/s]
+    velocity : of its origin's [m/s]
+    joint_rates : [rad/s or m/s], one for each
+
+    Examples
+    --------
+    >>> sp.auditing.TrajectoryNoise(attitude=0.002, joints=(0.001,)).position
+    0.0
+    """
+
+    attitude: float = 0.0
+    position: float = 0.0
+    joints: tuple[float, ...] = ()
+    rate: float = 0.0
+    velocity: float = 0.0
+    joint_rates: tuple[float, ...] = ()
+
+    __repr__ = short_repr
+
+
+@frozen(kw_only=True)
 class FloatingTrajectory:
     """Base and joints of a floating body at N times.
 
@@ -76,8 +106,6 @@ class FloatingTrajectory:
     captured: bool = False
     noise: TrajectoryNoise | None = None
 
-    __repr__ = short_repr
-
     def __post_init__(self) -> None:
         """Check the arrays against each other. Raises ShapeError, TrajectoryError, UnknownNameError."""
         where, put = self.name, object.__setattr__
@@ -113,7 +141,7 @@ class FloatingTrajectory:
 
     @staticmethod
     def from_mujoco(
-        body: Body,
+        body: Body | str,
         times: ArrayLike,
         qpos: ArrayLike,
         qvel: ArrayLike | None = None,
@@ -147,7 +175,7 @@ class FloatingTrajectory:
         >>> sp.FloatingTrajectory.from_mujoco(cat, np.linspace(0.0, 1.0, 21), qpos).shapes.shape
         (21, 3)
         """
-        check_object(body, "Body", "body")
+        body = as_body(body)
         if joint_order is not None:
             check_choice(joint_order, "joint_order", WORDS)
             if joint_names is not None:
@@ -166,7 +194,7 @@ class FloatingTrajectory:
 
     @staticmethod
     def from_pinocchio(
-        body: Body,
+        body: Body | str,
         times: ArrayLike,
         q: ArrayLike,
         v: ArrayLike | None = None,
@@ -197,6 +225,7 @@ class FloatingTrajectory:
         >>> sp.FloatingTrajectory.from_pinocchio(cat, np.linspace(0.0, 1.0, 21), q).quaternion[0].tolist()
         [0.0, 0.0, 0.0, 1.0]
         """
+        body = as_body(body)
         return _of_arrays(
             body, times, (q, v), ("q", "v"), PINOCCHIO_Q, joint_names, None, integrator_step=integrator_step, name=name
         )
@@ -274,7 +303,6 @@ def _of_arrays(
     name: str,
 ) -> FloatingTrajectory:
     """The trajectory in arrays of coordinates and of rates with a free joint."""
-    check_object(body, "Body", "body")
     names = None if joint_names is None else names_argument(joint_names, "joint_names", "names of joints")
     places = finite_array(arrays[0], labels[0], (None, None))
     motion = with_free_joint(layout, places, arrays[1], body, names=names, order=order, labels=labels, where=name)
@@ -291,3 +319,24 @@ def _of_arrays(
         joint_order=None if nameless is None else f"{nameless.title}: {', '.join(nameless.names)}",
         **rates_by_name(motion.rates),
     )
+
+
+def estimated_noise(trajectory: FloatingTrajectory) -> TrajectoryNoise:
+    """The noise of each kind of samples, as ever higher differences leave it (`white_noise`)."""
+    return TrajectoryNoise(
+        # Half the angle is in the quaternion, across it: three of its four numbers.
+        attitude=2.0 * _of_vector(continuous(trajectory.quaternion)),
+        position=_of_vector(trajectory.position),
+        joints=_of_each(trajectory.shapes),
+        rate=_of_vector(trajectory.rate),
+        velocity=_of_vector(trajectory.velocity),
+        joint_rates=_of_each(trajectory.joint_rates),
+    )
+
+
+def _of_vector(samples: Array | None) -> float:
+    return 0.0 if samples is None else float(white_noise(samples[:, None], 3)[0])
+
+
+def _of_each(samples: Array | None) -> tuple[float, ...]:
+    return () if samples is None else tuple(white_noise(samples[:, :, None], 1).tolist())

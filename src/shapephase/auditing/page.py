@@ -10,11 +10,12 @@ import numpy as np
 
 from ..arguments import check_object
 from ..body.body import Body
+from ..body.loading import as_body
 from ..letters import printable
-from ..plots.page import Page
+from ..plots.pages.page import Page
+from ..plots.pages.report_page import figure_rows
 from ..plots.pages.templates import page_from
 from ..plots.plot_style import axes_image
-from ..plots.report_page import figure_rows
 from ._held_states import held_states
 from ._observation import observed
 from ._residuals import residuals
@@ -28,7 +29,7 @@ _MOST_ROWS = 20  # hypotheses of the table; the record has all
 _KEY = "Grey: not audited."
 
 
-def audit_page(body: Body, trajectories: FloatingTrajectory | Sequence[FloatingTrajectory], found: Audit) -> Page:
+def audit_page(body: Body | str, trajectories: FloatingTrajectory | Sequence[FloatingTrajectory], found: Audit) -> Page:
     """Return the page of an audit, which opens offline.
 
     Momentum and fall are drawn for all samples, those that were not audited on grey; then the residuals before and
@@ -52,7 +53,7 @@ def audit_page(body: Body, trajectories: FloatingTrajectory | Sequence[FloatingT
     >>> sp.auditing.audit_page(cat, still, sp.audit(cat, still)).html[:9]
     '<!doctype'
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     check_object(found, "Audit", "found")
     given = [held_states(run)[0] for run in given_runs(trajectories)]
     return page_from(

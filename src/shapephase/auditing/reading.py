@@ -11,16 +11,16 @@ from typing import Unpack
 import numpy as np
 
 from .. import so3
-from ..arguments import check_choice, check_file_name, check_object, positive_argument
+from ..arguments import check_choice, check_file_name, positive_argument
 from ..body.body import Body
 from ..body.joint_orders import WORDS
+from ..body.loading import as_body
 from ..errors import ShapeError, TrajectoryError
 from ..shape_space.files.inputs import read_input
 from ..shape_space.files.options import TrajectoryOptions, check_options, show_options
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.files.times import recording_of
-from ._noise import estimated_noise
-from .floating_trajectory import FloatingTrajectory, rates_by_name
+from .floating_trajectory import FloatingTrajectory, estimated_noise, rates_by_name
 
 _CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")
 """Formats in which people are recorded; they say what is in degrees, and how attitudes are written."""
@@ -33,7 +33,9 @@ class StepOptions(TrajectoryOptions, total=False):
 
 
 @show_options(StepOptions)
-def read_trajectory(file: str | os.PathLike[str], body: Body, **options: Unpack[StepOptions]) -> FloatingTrajectory:
+def read_trajectory(
+    file: str | os.PathLike[str], body: Body | str, **options: Unpack[StepOptions]
+) -> FloatingTrajectory:
     """Return a trajectory with its base.
 
     Files are read as `read_recorded_motion` does, whose arguments the rest are. Where they hold arrays of a whole
@@ -61,7 +63,7 @@ def read_trajectory(file: str | os.PathLike[str], body: Body, **options: Unpack[
     >>> sp.read_trajectory("rest.npz", sp.load_body("cat_two_halves")).shapes.shape
     (21, 3)
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     check_file_name(file, "file")
     where = Path(file)
     check_options(options, StepOptions, "read_trajectory")

@@ -12,6 +12,7 @@ from .. import so3
 from ..arguments import check_object, positive_argument, whole_argument
 from ..arrays import Array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..deformation.deformation import articulated
 from ..error_bars.recorded_momentum import momentum_from_recording
 from ..errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
@@ -32,7 +33,6 @@ from ._engine_faults import (
 )
 from ._held_states import held_states
 from ._joint_offsets import joint_offsets
-from ._noise import TrajectoryNoise
 from ._observation import Observation, observed
 from ._other_readings import filtered_samples, other_readings, read_otherwise
 from ._outside_pushes import outside_pushes
@@ -42,7 +42,7 @@ from ._smooth_part import polynomials, smooth_part
 from ._surroundings import drag, wrong_gravity
 from ._wrong_inertias import wrong_inertias
 from .audit_result import Audit, RunAudit
-from .floating_trajectory import FloatingTrajectory
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise
 from .hypothesis import AND, Evidence, Hypothesis, Ranking
 
 _QUIET = 1e-6
@@ -67,7 +67,7 @@ _JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing
 
 
 def audit(
-    body: Body,
+    body: Body | str,
     trajectories: FloatingTrajectory | Sequence[FloatingTrajectory],
     *,
     tolerance: float | None = None,
@@ -115,7 +115,7 @@ def audit(
     >>> sp.audit(top, trajectory).right
     True
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     if noise is not None:
         check_object(noise, "TrajectoryNoise", "noise")
     runs = given_runs(trajectories)

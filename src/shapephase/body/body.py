@@ -8,7 +8,6 @@ import math
 import threading
 from collections.abc import Iterable, Mapping
 from copy import copy
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from .. import so3
 from ..arguments import made_by, positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..card_pictures import sticks_picture
-from ..display import Card, card_html, numbers, short_repr
+from ..display import Card, card_html, frozen, numbers
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
 from ..letters import value_text
@@ -46,7 +45,7 @@ from .shape_arguments import ShapeArguments
 _MOST_NAMED = 4  # joints on a card: they fit on one line
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class MovingPart:
     """Links that are fixed to each other, and their inertia together, in the axes of the first.
 
@@ -68,8 +67,6 @@ class MovingPart:
     mass: float
     centre: Array
     inertia: Array
-
-    __repr__ = short_repr
 
 
 @made_by("load_body(file or name)")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -13,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import made_by, on_unphysical_argument
-from ..arrays import Array, Integers, Mask, finite_array, lock_arrays, read_only
+from ..arrays import Array, Integers, Mask, finite_array, lock_arrays
 from ..errors import ShapeError, UnphysicalInertiaError, UnphysicalInertiaWarning, unknown_name
 from ..inertia_tensor import second_moment
 from ..letters import value_text
 from .inertial_regressor import OUTPUTS, PARAMETERS, inertial_regressor
-from .joint_chain import GEOMETRY, JointChain, inertial_numbers
+from .joint_chain import JointChain
 from .link_tree import LEAST_MASS, MOST_MASS, NEGATIVE, ROUNDING, TRIANGLE
 
 if TYPE_CHECKING:
@@ -32,8 +31,7 @@ _AT_ONCE = 10_000_000  # numbers of regressors in one pass: 80 MB
 class BodyFamily(Sequence["Body"]):
     """N bodies that differ in their inertias only: a sequence of them, made by `Body.with_inertias`.
 
-    `articulated` and `reconstruct` take it as they take a body. Where the links are and how they move is the same for
-    all, and computed once.
+    `articulated` and `reconstruct` take it as they take a body.
 
     Attributes
     ----------
@@ -99,15 +97,6 @@ class BodyFamily(Sequence["Body"]):
             values = regressor.inertia_and_momentum(self.masses, self.centres, self.tensors)
             inertia[:, part], momentum[:, part] = values
         return inertia, momentum
-
-    @cached_property
-    def rows(self) -> Array:
-        """The rows of each, as `LinkRows` has those of one body: (N, k + 1, 22), made when first needed."""
-        own = self.body.chain.rows
-        rows = np.empty((len(self), *own.rows.shape))
-        rows[..., :GEOMETRY] = own.rows[:, :GEOMETRY]
-        rows[..., GEOMETRY:] = inertial_numbers(own.bases, self.masses, self.centres, self.tensors)
-        return read_only(rows)
 
 
 _ASYMMETRY = 1e-9  # of the largest entry, between mirrored ones: printed digits

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, Integers
-from ..display import short_repr
-from ..inertia_tensor import FULL_FROM_SIX, SIX_OF_FULL
+from ..display import frozen
+from ..inertia_tensor import SIX_OF_FULL
 from ._model_tree import moving_joints
 from .couplings.coordinate_map import CoordinateMap
 
@@ -23,7 +23,7 @@ GEOMETRY = 12  # numbers that do not depend on masses; they come first
 _PARALLEL = 1e-14  # sine between a screw's axis and its slide: all that rounding leaves
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LinkRows:
     """Frame 0 is the base; joint k turns and slides frame k + 1 along its own z axis, by its coordinate q.
 
@@ -44,25 +44,13 @@ class LinkRows:
     follows: CoordinateMap
     bases: Any
 
-    __repr__ = short_repr
-
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
         """Coordinates and rates of all joints, followers included, contiguous: (N, n), (N, n) -> (N, k), (N, k)."""
         coordinates, speeds = self.follows.with_rates(shapes, rates)
         return np.ascontiguousarray(coordinates), np.ascontiguousarray(speeds)
 
-    def in_chain_axes(self, derivatives: Array) -> Array:
-        """Derivatives by first moments and inertias of frames, (m, k + 1, 10) as `inertial_sums` has them, turned."""
-        bases, result = np.asarray(self.bases, dtype=np.float64), derivatives.copy()
-        result[..., 1:4] = (bases @ derivatives[..., 1:4, None])[..., 0]
-        # An entry off the diagonal of a tensor stands there twice.
-        tensors = derivatives[..., 4:][..., FULL_FROM_SIX] * (0.5 + 0.5 * np.eye(3))
-        turned = bases @ tensors @ np.swapaxes(bases, -1, -2)
-        result[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., SIX_OF_FULL] * np.repeat([1.0, 2.0], 3)
-        return result
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointChain:
     """Frame 0 is the base; frame k + 1 hangs on joint k, later in the list than its parent, with links fixed to it.
 
@@ -100,8 +88,6 @@ class JointChain:
     inertias: Array
     follows: CoordinateMap
     link_frames: Mapping[str, tuple[int, Array]]
-
-    __repr__ = short_repr
 
     @property
     def matrix(self) -> Array:

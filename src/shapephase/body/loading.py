@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_choice, positive_argument
+from ..arguments import check_choice, check_object, positive_argument
 from ..errors import IgnoredElementWarning, ModelFileError, ShapeError, UnphysicalInertiaWarning, WrongObjectError
 from ..letters import value_text
 from ._cross_check import check_against_engine, check_against_file
@@ -26,6 +26,7 @@ from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
 from .joint_orders import joint_orders
 from .link_tree import hollow_warnings, inertia_warnings, massless_warning
+from .particles.point_masses import ParticleBody
 
 _Doubts = list[tuple[type[Warning], str]]
 _UNUSED = {
@@ -122,6 +123,19 @@ def load_body(
     for category, message in doubts:
         warnings.warn(message, category, stacklevel=2)
     return body
+
+
+def as_body(value: Body | str | None) -> Body:
+    """Return a body that a user gave, itself or by what `load_body` takes. Raises like it, and WrongObjectError."""
+    if isinstance(value, str):
+        return load_body(value)
+    check_object(value, "Body", "body")
+    return value
+
+
+def as_body_or_particles(value: Body | ParticleBody | str) -> Body | ParticleBody:
+    """Return `as_body`, or a body of particles."""
+    return value if isinstance(value, ParticleBody) else as_body(value)
 
 
 def loading_options(

@@ -54,7 +54,7 @@ def by_shape_and_rate(
         columns += cross(at.slides - arms, drift) + cross(sums.moment, cross(whole, at.slides) - point)
         np.matmul(rows[:, which], np.moveaxis(columns, 0, 1), out=by_shape[:, which])
     by_rates = rows.reshape(count, -1, 3) @ np.moveaxis(by_rate, 0, 1)
-    return by_independent(chain, by_shape.reshape(count, several * count_of_rows, -1), by_rates, shapes, rates)
+    return _by_independent(chain, by_shape.reshape(count, several * count_of_rows, -1), by_rates, shapes, rates)
 
 
 def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Array, Array]:
@@ -80,11 +80,11 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     speeds = at.speeds + cross(spin, at.origins)
     by_shape = cross(whole, at.axes) * about - cross(at.axes, speeds) * drift + cross(whole, at.slides) * drift
     by_rate = at.axes * about + at.slides * drift
-    gradients = by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
+    gradients = _by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
     return gradients[0][:, 0], gradients[1][:, 0]
 
 
-def by_independent(
+def _by_independent(
     chain: JointChain, by_shape: Array, by_rate: Array, shapes: Array, rates: Array
 ) -> tuple[Array, Array]:
     """Derivatives by the shape and its rate from those by coordinates and rates of all joints: (N, m, k), (N, m, k)

@@ -16,6 +16,7 @@ from .drawing.visual import Visual, inertia_box
 from .formats.urdf import WHOLE_TURN
 from .formats.xml_text import listed
 from .link_tree import ROUNDING
+from .loading import as_body
 
 _DENSITIES = (0.1, 22_600.0)  # [kg/m^3] a tenth of air, and osmium: no matter on earth is denser
 _MASS_RATIO = 1e4  # of links on one joint: a fingertip on an arm is a thousandth
@@ -25,7 +26,7 @@ _HEIGHTS = (0.9, 2.4)  # [m] of standing people
 _BEYOND_JOINTS = 0.039 + 0.130  # of the height: below ankles, above the head's joint (Drillis and Contini 1964)
 
 
-def implausible(body: Body) -> tuple[str, ...]:
+def implausible(body: Body | str) -> tuple[str, ...]:
     """Doubts about a body that no real one gives rise to, a sentence for each kind.
 
     Links that are denser than any matter or lighter than air, by the box of their inertia or by what is drawn of them;
@@ -39,7 +40,7 @@ def implausible(body: Body) -> tuple[str, ...]:
     >>> sp.body.implausible(cat)
     ()
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     chain, masses = body.chain, body.chain.masses
     names = [""] * len(masses)
     for link, (frame, _) in chain.link_frames.items():

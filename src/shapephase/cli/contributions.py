@@ -144,12 +144,12 @@ def contributions_command(
         )
         write_file(out, shares.write_csv)
         if figure is not None:
-            from ..plots.contribution_plots import contributions_figure
             from ..plots.plot_style import write_axes
+            from ..plots.segment_plots import contributions_figure
 
             write_file(figure, lambda file: write_axes(contributions_figure(shares), file))
         if html is not None:
-            from ..plots.segments_page import contributions_page
+            from ..plots.pages.segments_page import contributions_page
 
             page = contributions_page(shares, title=f"{flown.body.name} along {motion}", up=recording.up)
             write_file(html, page.write)

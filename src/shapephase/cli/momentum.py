@@ -157,7 +157,7 @@ def momentum_command(
 
             write_file(figure, lambda file: write_axes(plot_segment_momentum(column_axes(HEIGHT), found), file))
         if html is not None:
-            from ..plots.segments_page import momentum_page
+            from ..plots.pages.segments_page import momentum_page
 
             write_file(html, momentum_page(found, moving, title=heading.splitlines()[0], up=recording.up).write)
     text = f"{heading}\n{found}"

@@ -223,11 +223,7 @@ def joint_motion(
             if field.name != "up" and getattr(recording, field.name) != field.default:
                 option = f"--{field.name.replace('_', '-')}"
                 raise ShapeError(f"{option} is for recorded motions; {motion} is a motion of the library")
-        path, owner = named_motion(motion), MOTIONS[motion].body
-        if not set(path.joint_names or ()) <= set(body.joint_names):
-            fitting = [name for name, known in MOTIONS.items() if known.body == body.name]
-            hint = f"; of {body.name} there is {', '.join(fitting)}" if fitting else ""
-            raise ShapeError(f"{motion} is a motion of {owner}, whose joints {body.name} does not have{hint}")
+        path = named_motion(motion, body)
         for name, column in wheels.columns.items():
             raise ShapeError(
                 f"--rotor-speed {name}={column}: columns are those of recorded motions; {motion} is a motion of the "

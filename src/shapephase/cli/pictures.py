@@ -34,7 +34,7 @@ from .progress import steps
 from .terminal import write_file
 
 if TYPE_CHECKING:
-    from ..plots.page import Page
+    from ..plots.pages.page import Page
     from .motion import LoadedMotion
 
 
@@ -61,7 +61,7 @@ def view_command(
 ) -> Outcome:
     """Show a motion in 3-D in a browser, or write it as one HTML file that opens offline, or as a film."""
     from ..plots.pages.motion_data import up_axis
-    from ..plots.viewer import view
+    from ..plots.pages.viewer import view
     from . import motion as motions
     from .texts.recording_text import recording_data
 
@@ -106,7 +106,7 @@ def explore_command(
 
     The body has no angular momentum, or one that is chosen by sliders.
     """
-    from ..plots.explorer import explore
+    from ..plots.pages.explorer import explore
     from .motion import body_argument
 
     aside = check_page_files(html, None)

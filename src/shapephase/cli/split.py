@@ -114,7 +114,7 @@ def split_command(
         write_file(phases, lambda file: running_phases(flown.motion, times, gauge).write_csv(file))
         if html is not None:
             work.begin("making the report")
-            from ..plots.report_page import report
+            from ..plots.pages.report_page import report
 
             page = report(
                 flown.motion,

@@ -18,6 +18,7 @@ from ..inertia_tensor import second_moment
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
 from ..refinement import least_over
+from ..shape_space.body_path import as_path
 from ..shape_space.curves import Swings, most_swings
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
 from ..shape_space.scan.scanning import scanned
@@ -187,7 +188,7 @@ def rigid_part(
     return RigidPart(weight, place, second_moment(tensor))
 
 
-def moving_mass(mass: float, path: ShapePath) -> MovingMass:
+def moving_mass(mass: float, path: ShapePath | str) -> MovingMass:
     """A point mass of an assembly that moves in its frame: someone moving the furniture.
 
     Parameters
@@ -210,11 +211,11 @@ def moving_mass(mass: float, path: ShapePath) -> MovingMass:
     >>> sp.deformation.moving_mass(80.0, path).mass
     80.0
     """
-    check_object(path, "ShapePath", "path")
+    path = as_path(path)
     return MovingMass(positive_argument(mass, "mass", "a mass in kg"), _columns(path, 3, "a moving mass"))
 
 
-def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike, path: ShapePath) -> Boom:
+def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike, path: ShapePath | str) -> Boom:
     """A uniform boom of an assembly that comes out of the body, or goes in.
 
     What is not out is a point mass at rest at the root; what is out is a rod that moves along itself. Its mass is not
@@ -238,7 +239,7 @@ def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike,
     >>> sp.deformation.boom(6.0, 3.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), path).full_length
     3.0
     """
-    check_object(path, "ShapePath", "path")
+    path = as_path(path)
     weight = positive_argument(mass, "mass", "a mass in kg")
     whole = positive_argument(full_length, "full_length", "a length in m")
     axis = vector_argument(direction, "direction")

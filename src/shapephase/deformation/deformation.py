@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from ..arguments import (
     breaks_argument,
     check_function,
-    check_object,
     inertia_argument,
     made_by,
     on_unphysical_argument,
@@ -23,6 +22,7 @@ from ..arguments import (
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.family import BodyFamily
+from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, numbers, short_repr
@@ -32,7 +32,7 @@ from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler
 from ..letters import value_text
 from ..refinement import least_over
-from ..shape_space.body_path import FamilyVariants, path_gap, users_route_along
+from ..shape_space.body_path import as_path, path_gap, users_route_along
 from ..shape_space.scan.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ._physical_validity import check_never_on_a_line, check_triangle
@@ -288,15 +288,11 @@ class DeformationFamily(Sequence[Deformation]):
         batch = (len(self), *times.shape)
         return inertia.reshape(*batch, 3, 3), momentum.reshape(*batch, 3)
 
-    def variants(self) -> FamilyVariants:
-        """All of them for the integrator, to be sampled side by side."""
-        return FamilyVariants(self.bodies, self.path)
-
 
 @overload
 def articulated(
-    body: Body | ParticleBody,
-    path: ShapePath,
+    body: Body | ParticleBody | str,
+    path: ShapePath | str,
     *,
     rotors: Mapping[str, RotorValue] | None = None,
     rotor_speeds: Mapping[str, RotorValue] | None = None,
@@ -304,12 +300,12 @@ def articulated(
 
 
 @overload
-def articulated(body: BodyFamily, path: ShapePath) -> DeformationFamily: ...
+def articulated(body: BodyFamily, path: ShapePath | str) -> DeformationFamily: ...
 
 
 def articulated(
-    body: Body | ParticleBody | BodyFamily,
-    path: ShapePath,
+    body: Body | ParticleBody | BodyFamily | str,
+    path: ShapePath | str,
     *,
     rotors: Mapping[str, RotorValue] | None = None,
     rotor_speeds: Mapping[str, RotorValue] | None = None,
@@ -352,12 +348,12 @@ def articulated(
     """
     momenta, speeds = mapping_of_joints(rotors, "rotors"), mapping_of_joints(rotor_speeds, "rotor_speeds")
     if isinstance(body, BodyFamily):
-        check_object(path, "ShapePath", "path")
+        path = as_path(path, body.body)
         if momenta or speeds:
             raise ShapeError("rotors are those of one body; take one of the family, family[0]")
         return DeformationFamily(body, users_route_along(body.body, path))
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
+    body = as_body_or_particles(body)
+    path = as_path(path, body)
     if isinstance(body, ParticleBody):
         if momenta or speeds:
             raise ShapeError("rotors are wheels of links; a body of particles has none")

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_function, check_object, initial_state_arguments, tolerance_argument
+from ..arguments import check_function, initial_state_arguments, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.inverse_dynamics import falling_efforts
+from ..body.loading import as_body
 from ..chebyshev import inside
 from ..deformation.deformation import articulated
 from ..deformation.rotors import widened_path
@@ -23,6 +24,7 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.driven_attitude import DrivenAttitude, driven_attitude
 from ..letters import value_text
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.body_path import as_path
 from ..shape_space.curves import PiecewisePolynomial
 from ..shape_space.shape_path import ShapePath
 
@@ -59,8 +61,8 @@ class FreeHinges:
 
 
 def free_hinges(
-    body: Body,
-    path: ShapePath,
+    body: Body | str,
+    path: ShapePath | str,
     free: Mapping[str, tuple[float, float]],
     momentum: ArrayLike,
     attitude: ArrayLike | None = None,
@@ -101,8 +103,8 @@ def free_hinges(
     >>> bool(np.abs(sp.joint_torques(found.motion).torque[:, 0]).max() < 1e-9)  # nothing drives the hinge
     True
     """
-    check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
+    body = as_body(body)
+    path = as_path(path, body)
     goal = tolerance_argument(tolerance)
     starts = _starts(body, free)
     names = tuple(free)

@@ -22,10 +22,9 @@ from ..arrays import Array, Integers
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..body.inertial_regressor import LinkMotions, by_link_parameters, link_motions
-from ..body.momentum_gradients import by_independent, by_shape_and_rate
+from ..body.momentum_gradients import by_shape_and_rate
 from ..deformation.rotors import RotorDescription
 from ..inertia_tensor import inverse_inertia
-from ..integrator import link_tree, machine_code
 from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.forced_motion import ForcedMotion
@@ -383,11 +382,7 @@ class BodyAlong:
         chain = reduced_chain(self.body.chain, self.wheels.rotors)
         closing = samples.is_closing(self.times)
         check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
-        if self._has_kernels:
-            of_all = link_tree.momentum_gradients(chain.rows, self.shapes, self.rates, spins, rows)
-            parts = by_independent(chain, *of_all, self.shapes, self.rates)
-        else:
-            parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
+        parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
         if self.wheels.rotors:
             by_shape, by_rate = (derivative[..., self.wheels.driven] for derivative in parts)
             parts = by_shape + self.wheels.by_shape(rows), by_rate
@@ -402,19 +397,9 @@ class BodyAlong:
 
     def by_inertias(self, spins: Array, rows: Array) -> Array:
         """Derivatives by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
-        chain = self.body.chain
-        if not self._has_kernels:
-            pairs = zip(np.moveaxis(rows, 1, 0), np.moveaxis(spins, 1, 0), strict=True)
-            derivative = np.concatenate([by_link_parameters(self._links, row, spin) for row, spin in pairs])
-        else:
-            sums = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
-            derivative = chain.rows.in_chain_axes(sums).reshape(len(sums), -1)
+        pairs = zip(np.moveaxis(rows, 1, 0), np.moveaxis(spins, 1, 0), strict=True)
+        derivative = np.concatenate([by_link_parameters(self._links, row, spin) for row, spin in pairs])
         return self.wheels.by_inertias(derivative, rows) if self.wheels.rotors else derivative
-
-    @property
-    def _has_kernels(self) -> bool:
-        """True where kernels serve: bodies with ball joints have no rows, and interpreted kernels are slower."""
-        return self.body.chain.has_rows and machine_code.is_used()
 
     @cached_property
     def _links(self) -> LinkMotions:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple, overload
 
@@ -13,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_executor, whole_argument
-from ..arrays import Array, lock_arrays
+from ..arrays import Array
 from ..body.body import Body
 from ..deformation.deformation import articulated
 from ..deformation.rotors import Rotor
-from ..display import short_repr
+from ..display import frozen
 from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
 from ..reconstruction.forced_motion import ForcedMotion
@@ -50,7 +49,7 @@ _ROTATIONS = (
 _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Uncertainty:
     """Error bars of the results of a motion, to first order or from draws. Made by `uncertainty`.
 
@@ -86,9 +85,6 @@ class Uncertainty:
     wheel_angle: float
     smoothing_bias: float = 0.0
     draws: int = 0
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
 
 @overload

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from .. import so3
-from ..arrays import Array, lock_arrays
-from ..display import short_repr
+from ..arrays import Array
+from ..display import frozen
 from ..errors import WrongObjectError
 from ..reconstruction.external_torque import TorqueState
 from ..reconstruction.forced_motion import ForcedMotion
@@ -23,7 +23,7 @@ _TURN = so3.exp(np.array([0.7, -0.4, 0.5]))  # to another attitude, at which a t
 _FACTOR = 1.3  # of rates, momenta and inertias there
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ForcedUncertainty:
     """Error bars of a motion under a torque, to first order. Made by `uncertainty`.
 
@@ -48,9 +48,6 @@ class ForcedUncertainty:
     state: Array
     total_rotation: Array
     total_angle: float
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     @property
     def final_attitude(self) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,9 +10,10 @@ from numpy.typing import ArrayLike
 from ..arguments import check_flag, check_object, initial_state_arguments
 from ..arrays import finite_array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..deformation.deformation import Deformation, articulated
 from ..deformation.rotors import RotorValue, mapping_of_joints
-from ..display import short_repr
+from ..display import frozen
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion, momentum_from_rate, reconstruct
 from ..run_progress import ProgressCallback
@@ -23,7 +23,7 @@ from ..warning_filters import quiet
 from .recorded_momentum import RecordedMomentum, momentum_from_recording, warn_of_drift
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class RecordedFlight:
     """A recording as a motion. Made by `motion_from_recording`.
 
@@ -39,11 +39,9 @@ class RecordedFlight:
     momentum_by: str
     fitted: RecordedMomentum | None = None
 
-    __repr__ = short_repr
-
 
 def motion_from_recording(
-    body: Body,
+    body: Body | str,
     recorded: RecordedMotion,
     *,
     momentum: ArrayLike | None = None,
@@ -97,7 +95,7 @@ def motion_from_recording(
     >>> print(sp.motion_from_recording(cat, sp.read_recorded_motion("joints.csv", cat)).momentum_by)
     nothing
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     check_object(recorded, "RecordedMotion", "recorded")
     check_flag(find_axes, "find_axes")
     if momentum is not None:

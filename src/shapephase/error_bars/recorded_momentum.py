@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import warnings
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_flag, check_object, number_argument, times_argument
-from ..arrays import Array, copied_when_read, finite_array, lock_arrays
+from ..arrays import Array, copied_when_read, finite_array
 from ..deformation.deformation import Deformation
-from ..display import short_repr
+from ..display import frozen
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion
 from ..reconstruction.recorded_base import INVERSE, W_FIRST, read_w_first
@@ -29,7 +29,7 @@ _CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller chan
 
 
 @copied_when_read("initial_attitude", "base_axes")
-@dataclass(frozen=True, eq=False)
+@frozen
 class RecordedMomentum:
     """The momentum and start with which a body comes nearest to the attitudes and rates that were recorded.
 
@@ -85,9 +85,6 @@ class RecordedMomentum:
     rate_residuals: Array
     bias: Array
     bias_covariance: Array | None
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     @property
     def angles(self) -> Array:

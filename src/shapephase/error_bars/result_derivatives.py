@@ -11,11 +11,11 @@ import numpy as np
 
 from .. import so3
 from ..arguments import check_object
-from ..arrays import Array, lock_arrays
+from ..arrays import Array
 from ..body.body import Body
 from ..deformation.descriptions import ArticulatedDescription
 from ..deformation.rotors import Rotor, RotorDescription
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapeError, WrongObjectError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.forced_motion import ForcedMotion
@@ -26,7 +26,7 @@ from ._along_motion import AlongMotion, BodyAlong, along_motion, responses
 from .wheels_along import WheelsAlong
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ResultDerivative:
     """Derivatives of the results of `split` by m numbers, whose change c changes the results by derivative @ c.
 
@@ -50,9 +50,6 @@ class ResultDerivative:
     dynamic_phase: Array
     solid_angle: Array
     montgomery_phase: Array
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)

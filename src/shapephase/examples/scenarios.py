@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,14 +11,17 @@ import numpy as np
 
 from ..arguments import check_choice, number_argument, positive_argument
 from ..arrays import Array
-from ..body.loading import load_body
+from ..body.body import Body
+from ..body.loading import as_body_or_particles, load_body
+from ..body.particles.point_masses import ParticleBody
 from ..deformation.deformation import articulated
 from ..deformation.gauge import horizontal_gauge
 from ..display import short_repr
-from ..errors import TrajectoryError
+from ..errors import ShapeError, TrajectoryError
 from ..phases.return_map import closed_orbits
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import Curve, Swings
+from ..shape_space.files.read import read_shape_path
 from ..shape_space.shape_path import ShapePath
 from ._closed_form_motions import Example
 
@@ -337,16 +341,40 @@ CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {
 }
 
 
-def named_motion(name: str) -> ShapePath:
-    """The path of one of `MOTIONS`, whose `attitude` is how it begins. Raises UnknownNameError.
+def named_motion(name: str, body: Body | ParticleBody | str | None = None) -> ShapePath:
+    """The path of one of `MOTIONS`, whose `attitude` is how it begins, or of a recording.
+
+    Functions that take a `ShapePath` take such a name in its place.
+
+    Parameters
+    ----------
+    name : of a motion; for a `Body` also the name of a file of `read_shape_path`, which comes first
+    body : whose joints the motion must have; None: any
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown name.
+    ShapeError
+        For a motion of joints that the body does not have.
+    TrajectoryError
+        For the faults of a file.
 
     Examples
     --------
     >>> sp.examples.named_motion("cat_righting").duration
     2.0
     """
-    check_choice(name, "motion", MOTIONS)
-    return MOTIONS[name].path()
+    body = None if body is None else as_body_or_particles(body)
+    if isinstance(body, Body) and os.path.isfile(name):
+        return read_shape_path(name, body)
+    check_choice(name, "motion" if body is None else "motion (no such file either)", MOTIONS)
+    path, owner = MOTIONS[name].path(), MOTIONS[name].body
+    if body is not None and not set(path.joint_names or ()) <= set(body.joint_names):
+        fitting = [other for other, known in MOTIONS.items() if known.body == body.name]
+        hint = f"; of {body.name} there is {', '.join(fitting)}" if fitting else ""
+        raise ShapeError(f"{name} is a motion of {owner}, whose joints {body.name} does not have{hint}")
+    return path
 
 
 def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:

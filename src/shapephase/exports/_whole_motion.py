@@ -17,6 +17,7 @@ from ..dynamics.moving_body import body_and_path, check_motion, moving_body, nee
 from ..dynamics.wheels import base_momenta, wheel_angles, wheel_columns, wheels_of, with_wheels
 from ..errors import ShapeError, UnknownNameError
 from ..inertia_tensor import inverse_inertia
+from ..reconstruction.attitude_angles import continuous
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 
@@ -190,7 +191,4 @@ def base_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
 
 def continued_quaternions(attitudes: Array) -> Array:
     """Quaternions x y z w of attitudes that follow each other, of one sign throughout: (N, 3, 3) -> (N, 4)."""
-    quaternions = so3.quat_from_matrix(attitudes)
-    flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0)
-    quaternions[1:] *= np.cumprod(flips)[:, None]
-    return quaternions
+    return continuous(so3.quat_from_matrix(attitudes))

@@ -6,14 +6,13 @@ import datetime
 import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
 from .. import __version__
 from ..arguments import check_choice, check_file_name, check_text
 from ..arrays import Array
-from ..display import short_repr
+from ..display import frozen
 from ..errors import UnknownNameError
 from ..files import write_whole
 from ..provenance import provenance
@@ -27,7 +26,7 @@ _VERSION = "CCSDS_AEM_VERS"  # name of the first entry
 _DIGITS = 15  # of a second: a turn at 100 rad/s within the last one is below rounding
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class AttitudeMessage:
     """A message that was written.
 
@@ -45,8 +44,6 @@ class AttitudeMessage:
     records: int
     error: float
     degree: int
-
-    __repr__ = short_repr
 
 
 def write_aem(

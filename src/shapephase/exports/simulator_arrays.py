@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_keywords, check_object
-from ..arrays import Array, lock_arrays
+from ..arrays import Array
 from ..body.couplings.coordinate_map import check_no_balls
 from ..body.formats.xml_text import listed
 from ..body.joint_orders import MUJOCO, simulator_order
-from ..display import short_repr
+from ..display import frozen
 from ..errors import UnknownNameError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
@@ -25,7 +24,7 @@ _SCALAR_FIRST = [3, 0, 1, 2]  # w, x, y, z from x y z w
 _MUJOCO_FREE = 0  # MuJoCo's number of free joints among the kinds
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class MujocoArrays:
     """A motion as MuJoCo has it.
 
@@ -44,11 +43,8 @@ class MujocoArrays:
     qvel: Array
     joint_names: tuple[str, ...]
 
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
-
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class PinocchioArrays:
     """A motion as Pinocchio has it, of a model whose base is a free-flyer.
 
@@ -68,9 +64,6 @@ class PinocchioArrays:
     v: Array
     a: Array
     joint_names: tuple[str, ...]
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
 
 def mujoco_arrays(

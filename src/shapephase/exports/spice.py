@@ -6,7 +6,6 @@ import json
 import os
 import tempfile
 import textwrap
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from .. import so3
 from ..arguments import check_file_name, check_text, number_argument, whole_argument
 from ..arrays import Array
-from ..display import short_repr
+from ..display import frozen
 from ..errors import AccuracyNotReached, MissingExtraError, OutputFileError, UnknownNameError
 from ..files import write_whole
 from ..provenance import provenance
@@ -58,7 +57,7 @@ CK_{instrument}_SPK         = -{clock}
 """
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class SpiceKernels:
     """Kernels that were written.
 
@@ -80,8 +79,6 @@ class SpiceKernels:
     instrument: int
     clock_id: int
     frame: str
-
-    __repr__ = short_repr
 
 
 def write_spice_ck(

@@ -1,4 +1,3 @@
-from .driven_attitude import dop853_rotation
 from .integrate import stepped_rotation
 from .interpolant import Interpolant
 from .kept_code import code_folder
@@ -14,6 +13,5 @@ __all__ = [
     "SteppedRotation",
     "code_folder",
     "compile_steps",
-    "dop853_rotation",
     "stepped_rotation",
 ]

@@ -27,7 +27,6 @@ class Channels:
     def __init__(self, evaluate: Evaluate, directly: Directly | None = None) -> None:
         self._evaluate, self._directly = evaluate, directly
         self._known: dict[bytes, Array] = {}
-        self._uncounted: set[bytes] = set()
         self.count = 0
 
     def __call__(self, times: Array) -> Array:
@@ -38,15 +37,7 @@ class Channels:
             channels = self.fresh(times)
             if len(times) <= _AT_ONCE:
                 self._known[key] = channels
-        elif key in self._uncounted:
-            self._uncounted.remove(key)
-            self.count += len(times)
         return channels
-
-    def know(self, times: Array, channels: Array) -> None:
-        """Keep channels that were evaluated elsewhere; they are counted at their first use."""
-        self._known[times.tobytes()] = channels
-        self._uncounted.add(times.tobytes())
 
     def fresh(self, times: Array) -> Array:
         """Channels evaluated anew: (N,) -> (N, 9)."""

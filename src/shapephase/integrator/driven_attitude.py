@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import reduce
 from typing import Protocol
 
 import numpy as np
 
 from .. import so3
-from ..arrays import Array, lock_arrays
-from ..display import short_repr
+from ..arrays import Array
+from ..display import frozen
 from ..errors import AccuracyNotReached
 from ..sphere import gauss_nodes
 from .channels import Evaluate
@@ -48,7 +47,7 @@ class StatesInTime(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class DrivenAttitude:
     """Attitudes and other states in time.
 
@@ -66,9 +65,6 @@ class DrivenAttitude:
     attitude_errors: Array
     state_errors: Array
     evaluations: int
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
     @property
     def times(self) -> Array:
@@ -213,32 +209,13 @@ def _defects(slopes: Callable[[Array, Array], Array], run: Run) -> Array:
     return defects
 
 
-def dop853_rotation(
-    evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float
-) -> tuple[Callable[[Array], Array], int]:
-    """S(t) for one Pi_0 by SciPy's DOP853 on the quaternion, restarted at the breaks.
-
-    Every stage evaluates the deformation itself; the library's interpolation and stepping are not used.
-
-    Returns a function of times (N,) -> quaternions (N, 4), and the number of evaluations of I and L_o. Raises the
-    errors of `driven_attitude`. An independent check of `integrate`.
-
-    Examples
-    --------
-    >>> def evaluate(t):
-    ...     return np.broadcast_to(np.diag([1.0, 2.0, 2.5]), (len(t), 3, 3)), np.zeros((len(t), 3))
-    >>> turn, _ = sp.integrator.dop853_rotation(evaluate, np.array([0.0, 1.0]), np.array([0.0, 0.0, 5.0]), 1e-9)
-    >>> print(f"{np.linalg.norm(sp.so3.rotation_vector_from_quat(turn(np.array([1.0])))):.6f}")
-    2.000000
-    """
-    driven = dop853_attitude(evaluate, breaks, momentum, tolerance)
-    return driven.run, driven.evaluations
-
-
 def dop853_attitude(
     evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float, limits: StepLimits | None = None
 ) -> DrivenAttitude:
-    """S(t) of `dop853_rotation` with its measured error, by steps within limits; errors as `driven_attitude`."""
+    """S(t) for one Pi_0 by SciPy's DOP853 on the quaternion, restarted at the breaks, with its measured error.
+
+    Every stage evaluates the deformation itself, an independent check of `integrate`. Raises as `driven_attitude`.
+    """
 
     def rates(times: Array, attitudes: Array, states: Array) -> tuple[Array, Array]:
         inertia, internal = evaluate(times)

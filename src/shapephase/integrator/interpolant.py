@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 from ..arrays import Array, Integers, lock_arrays
 from ..chebyshev import PiecewiseChebyshev
-from ..display import short_repr
+from ..display import frozen
 from ..inertia_tensor import FULL_FROM_SIX
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Interpolant:
     """I^-1 (6 numbers) and I^-1 L_o (3) on panels: nine channels as Chebyshev series.
 
@@ -36,8 +36,6 @@ class Interpolant:
     loops: int
     evaluations: int
     widths: Array = field(init=False)
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Find the widths, and let nobody write to the arrays."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from .. import so3
-from ..arrays import Array, Integers, lock_arrays, read_only
+from ..arrays import Array, Integers, read_only
 from ..chebyshev import inside, nodes_on, values_to_coefficients
-from ..display import short_repr
+from ..display import frozen
 from .integrate import committed_rounding
 from .interpolant import Interpolant
 from .samples import Perturbed
@@ -24,7 +24,7 @@ _SAFETY_FACTOR = 2.0  # times the distance from twice as many steps, which is th
 _MOST_HALVINGS = 3  # of the steps of a lift
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Lift:
     """Rotation of the frame by the shape alone, on the samples of a motion, whose steps end where some of its own end.
 
@@ -44,10 +44,6 @@ class Lift:
     quaternions: Array
     finer: Array
     ends: Integers
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
     @cached_property
     def end(self) -> Array:

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import so3
-from ..arrays import Array, lock_arrays
+from ..arrays import Array
 from ..chebyshev import inside
+from ..display import frozen
 from ..errors import AccuracyNotReached
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class StepLimits:
     """The longest steps, interval by interval.
 
@@ -24,8 +25,6 @@ class StepLimits:
 
     edges: Array
     longest: Array
-
-    __post_init__ = lock_arrays
 
     @staticmethod
     def even(edges: Array, steps: float) -> StepLimits:

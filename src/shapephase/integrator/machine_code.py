@@ -29,7 +29,7 @@ _R = TypeVar("_R")
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 # Modules of `kernels/`, each with a function `warm` that calls its kernels once.
-_MODULES = ("step_kernel", "spectra_kernel", "curve_kernel", "tree_kernel", "gradient_kernel")
+_MODULES = ("step_kernel", "spectra_kernel", "curve_kernel", "tree_kernel")
 # Without `forceinline` loops over lanes take half as long again; the compiler takes as long with as without.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True, "no_cfunc_wrapper": True}
 _NUMBA_DOES_NOT_WORK = (ImportError, AttributeError, SystemError)  # raised by a Numba for another NumPy or Python

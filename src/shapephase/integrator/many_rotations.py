@@ -7,20 +7,22 @@ above the tolerance, they go on with refinements of their own, which are rounded
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from .. import run_progress
 from ..arrays import Array, Integers
-from ..errors import AccuracyNotReached
+from ..errors import AccuracyNotReached, SingularInertiaError
 from .integrate import Progress, Refinement, one_round
 from .interpolant import Interpolant
 from .sampling import Sampler
 from .stepped import SteppedRotation, for_whole_batch, of_rows
 from .stepping import magnitudes_and_directions
 
+_MOST_KEPT = 1_000_000_000  # numbers of the series of a family: eight gigabytes
 CLASSES = 4  # of magnitudes in each factor of two: finer ones are more, coarser ones take more steps than needed
 
 
@@ -138,6 +140,31 @@ def rotations_of_each(
     if len(parts) == 1:
         return parts[0].rotation
     return GroupedRotations(tuple(parts), sampler.evaluations)
+
+
+def rotations_of_variants(
+    samplers: Iterable[Sampler], momentum: Array, tolerance: float
+) -> tuple[SteppedRotation, ...]:
+    """Integrate the attitude equation of N deformations for one momentum (N, 3) [kg m^2/s] each, to a tolerance [rad].
+
+    Raises AccuracyNotReached and SingularInertiaError where one deformation alone would; the message has its number.
+    """
+    count, rotations = len(momentum), []
+    run_progress.begin(run_progress.STEPPING, max(count, 1))
+    for row, sampler in enumerate(samplers):
+        try:
+            rotation = rotations_of_each(sampler, momentum[row : row + 1], tolerance)
+        except (AccuracyNotReached, SingularInertiaError) as error:
+            raise type(error)(f"body {row} of {count}: {error}") from error
+        assert isinstance(rotation, SteppedRotation)
+        rotations.append(rotation)
+        if count * rotation.interpolant.coefficients.size > _MOST_KEPT:
+            raise AccuracyNotReached(
+                f"{count} motions on some {len(rotation.interpolant.coefficients)} panels each take too much memory; "
+                "take slices of the family"
+            )
+        run_progress.advance(1)
+    return tuple(rotations)
 
 
 def _integrated(

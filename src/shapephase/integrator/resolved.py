@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Array, Integers, lock_arrays
+from ..arrays import Array, Integers
+from ..display import frozen
 
 DEGREE = 32  # of the series on every panel
 _AT_REST = 1e-14  # [rad]: values without rates, like a given inertia, scatter by this much through rounding
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ResolvedPath:
     """Shapes and rates as Chebyshev series on panels, right to rounding.
 
@@ -30,8 +31,6 @@ class ResolvedPath:
     noise: Array
     duration: float
     defect: float = 0.0
-
-    __post_init__ = lock_arrays
 
     @property
     def edges(self) -> Array:

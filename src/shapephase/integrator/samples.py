@@ -7,8 +7,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ..arrays import Array, Integers, lock_arrays, read_only
-from ..display import short_repr
+from ..arrays import Array, Integers, read_only
+from ..display import frozen
 from ..errors import AccuracyNotReached
 from ..inertia_tensor import FULL_FROM_SIX, SIX_OF_FULL
 from .constants import EPS
@@ -19,7 +19,7 @@ from .machine_code import plain
 _AT_ONCE = 2048  # panels: some megabytes
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Perturbed:
     """The interpolant with its last coefficients perturbed by the estimated truncation error.
 
@@ -29,10 +29,6 @@ class Perturbed:
 
     coefficients: Array
     hidden: float
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +43,7 @@ class Panels:
     degrees: Integers
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Samples:
     """Samples of a deformation for momenta up to a magnitude.
 
@@ -73,8 +69,6 @@ class Samples:
     condition: float
     rates: tuple[float, float]
     too_rough: AccuracyNotReached | None = None
-
-    __repr__ = short_repr
 
     @cached_property
     def perturbed(self) -> Perturbed:

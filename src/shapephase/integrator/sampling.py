@@ -6,7 +6,7 @@ gets 8, 16 or 32 degrees, beyond which it is halved, until what is missing from 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
 
@@ -51,17 +51,6 @@ class Sampler:
         self.channels = Channels(evaluate, directly)
         self.known = known
         self._samples: dict[tuple[float, float], Samples] = {}
-        self._first: Panels | None = None
-
-    def begin_with(self, panels: Panels, known: Iterable[tuple[Array, Array]]) -> None:
-        """Begin with these panels; `known` : times (S,) [s] and the channels (S, 9) there."""
-        self._first = panels
-        for times, channels in known:
-            self.channels.know(times, channels)
-
-    def first_panels(self, tolerance: float) -> Panels:
-        """Panels that leave at most `tolerance` [rad] unseen of what is known."""
-        return Panels(*self.known.first_panels(tolerance)) if self._first is None else self._first
 
     @property
     def evaluations(self) -> int:
@@ -90,12 +79,6 @@ class Sampler:
         if strict and samples.too_rough is not None:
             raise samples.too_rough
         return samples
-
-
-def nodes_of_panels(panels: Panels) -> Array:
-    """All nodes of panels, those of one degree after those of another: (S,) [s]."""
-    end = float(panels.edges[-1])
-    return np.concatenate([part.times(end).ravel() for part in _by_degree(panels)])
 
 
 def _by_degree(panels: Panels) -> list[_Panels]:
@@ -191,7 +174,7 @@ class _Sampling:
                 f"rates and values of the function of time disagree by {defect:.3g} rad, which is too much for samples "
                 f"good to {self._tolerance:.3g} rad; give the exact derivatives, or loosen the tolerance"
             )
-        first = self._sampler.first_panels(HIDDEN_SHARE * self._tolerance)
+        first = Panels(*known.first_panels(HIDDEN_SHARE * self._tolerance))
         most = _MOST_PANELS + 40 * len(known.breaks) + len(first.degrees)
         waiting = _by_degree(first)
         while waiting:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
 from ..arrays import Array, Integers
-from ..display import short_repr
+from ..display import frozen
 from .limited_steps import StepLimits
 from .resolved import ResolvedPath
 
@@ -21,7 +20,7 @@ _TERMS = np.array([5, 10, 21])  # highest degrees of a path for 8, 16 and 32: an
 DEGREES = (8, 16, 32)  # of panels, nested; beyond the last a panel is halved
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Smoothness:
     """Prior knowledge of a function of time, by which its first panels are chosen.
 
@@ -47,8 +46,6 @@ class Smoothness:
     smooth_loop: bool = False
     resolved: ResolvedPath | None = None
     checked: bool = False
-
-    __repr__ = short_repr
 
     @property
     def period(self) -> float:

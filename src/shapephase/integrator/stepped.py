@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from .. import so3, sphere
-from ..arrays import Array, Integers, lock_arrays, read_only
-from ..display import short_repr
+from ..arrays import Array, Integers, read_only
+from ..display import frozen
 from .closing import areas_back, far_references, jumps_between
 from .interpolant import Interpolant
 from .kernels.curve_kernel import within_steps
@@ -23,7 +23,7 @@ _BATCHED_FIELDS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class SteppedRotation:
     """S(t), the attitude relative to the start, at every time, for a batch of momenta.
 
@@ -60,10 +60,6 @@ class SteppedRotation:
     rounding_error: Array
     amplification: Array
     perturbed: Perturbed
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
     @cached_property
     def panel(self) -> Integers:

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from .. import so3
-from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
 from ..dynamics.torques import joint_torques
 from ..errors import AccuracyNotReached
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.body_path import route_along
+from ..shape_space.body_path import as_path, route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
 from ._spline_basis import gauss_tableau
@@ -26,7 +26,7 @@ _HALVINGS = 6  # of two panels between two breaks, until the cost has converged
 _CONVERGED = 1e-10  # relative change between subdivisions: 100 roundings of the body's matrices
 
 
-def path_cost(body: Body | ParticleBody, path: ShapePath, cost: Any = "kinetic") -> float:
+def path_cost(body: Body | ParticleBody | str, path: ShapePath | str, cost: Any = "kinetic") -> float:
     """Cost of a path that is the integral of a metric (see `plan_reorientation`), with the body's own matrices.
 
     By Gauss quadrature with twelve nodes a panel; the panels between two breaks of the path are halved until the cost
@@ -45,8 +45,8 @@ def path_cost(body: Body | ParticleBody, path: ShapePath, cost: Any = "kinetic")
     >>> print(f"{sp.optimal_control.path_cost(cat, loop, 'rate'):.6f} rad^2/s")
     5.169923 rad^2/s
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
+    body = as_body_or_particles(body)
+    path = as_path(path, body)
     metric = metric_argument(body, cost, "cost of a path")
     route = route_along(body, path)
     before, panels = _quadrature(body, route, metric, 2), 2

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_executor, check_object
+from ..arguments import check_executor
 from ..arrays import Array
 from ..body.body import Body
+from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
 from ..deformation.deformation import articulated
 from ..errors import PlanNotFound
@@ -65,7 +66,7 @@ _USUAL_ITERATIONS = 50  # iterations after which half of a start is reported as 
 
 
 def plan_reorientation(
-    body: Body | ParticleBody,
+    body: Body | ParticleBody | str,
     goal: Goal | ArrayLike,
     *,
     momentum: ArrayLike = 0.0,
@@ -147,7 +148,7 @@ def plan_reorientation(
     >>> print(f"{sp.so3.angle(goal.T @ plan.motion.final_attitude):.6f} rad off")
     0.000000 rad off
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     check_executor(executor)
     check_progress(progress)
     chosen = Search() if search is None else search

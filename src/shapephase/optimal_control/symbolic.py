@@ -10,12 +10,13 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..arguments import check_choice, check_object
+from ..arguments import check_choice
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import CoordinateMap
 from ..body.couplings.functions import JointFunction
 from ..body.joint_chain import JointChain
+from ..body.loading import as_body_or_particles
 from ..body.particles._casadi_positions import symbol_kind
 from ..body.particles.point_masses import ParticleBody
 from ..display import short_repr
@@ -118,7 +119,7 @@ class SymbolicBody:
         return self._made[key]
 
 
-def symbolic_body(body: Body | ParticleBody) -> SymbolicBody:
+def symbolic_body(body: Body | ParticleBody | str) -> SymbolicBody:
     """Return the functions of a body; built at its first call, kept as long as the body.
 
     Source: the composite rigid body algorithm (Featherstone, Rigid Body Dynamics Algorithms, section 6.2), reduced by
@@ -131,7 +132,7 @@ def symbolic_body(body: Body | ParticleBody) -> SymbolicBody:
     >>> print(np.array(functions.inertia(np.zeros(3))).diagonal().round(6))
     [0.005 0.02  0.02 ]
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     with _building:
         if body not in _built:
             _built[body] = _symbolic(body) if isinstance(body, Body) else _of_particles(body)

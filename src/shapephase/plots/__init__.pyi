@@ -1,23 +1,28 @@
 from ._moving_scene import MovingScene, moving_scene
-from .contribution_plots import contributions_figure, plot_direct_shares, plot_shares
-from .explorer import explore
-from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
+from .chart_plots import plot_elliptic_cylinders, plot_euler_angles, plot_pendulum
+from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_first_return, plot_potential, plot_surface_locus
 from .loop_plots import plot_loop
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
-from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
+from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases, plot_torques
 from .named_figures import FIGURES, Figure, write_figure
-from .page import Page
+from .pages.explorer import explore
+from .pages.page import Page
 from .pages.poinsot_page import rolling_ellipsoid
+from .pages.report_page import report
+from .pages.segments_page import contributions_page, momentum_page
+from .pages.viewer import view
 from .plot_style import column_axes
 from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
 from .regime_plots import plot_bounds, plot_crown
-from .report_page import report
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
-from .segment_plots import plot_segment_momentum, plot_somersault
-from .segments_page import contributions_page, momentum_page
+from .segment_plots import (
+    contributions_figure,
+    plot_direct_shares,
+    plot_segment_momentum,
+    plot_shares,
+    plot_somersault,
+)
 from .shape_plots import plot_curvature, plot_reach, plot_shape_path, plot_shape_plane
-from .torque_plots import plot_torques
-from .viewer import view
 
 __all__ = [
     "FIGURES",
@@ -38,8 +43,10 @@ __all__ = [
     "plot_crown",
     "plot_curvature",
     "plot_direct_shares",
-    "plot_ellipsoid_locus",
+    "plot_elliptic_cylinders",
     "plot_energy",
+    "plot_euler_angles",
+    "plot_first_return",
     "plot_fixed_points",
     "plot_heavy_top_stability",
     "plot_herpolhode",
@@ -47,8 +54,10 @@ __all__ = [
     "plot_internal_momentum",
     "plot_loop",
     "plot_momentum_curve",
+    "plot_pendulum",
     "plot_phases",
     "plot_polhodes",
+    "plot_potential",
     "plot_reach",
     "plot_rolling_ellipsoid",
     "plot_segment_momentum",
@@ -56,6 +65,7 @@ __all__ = [
     "plot_shape_plane",
     "plot_shares",
     "plot_somersault",
+    "plot_surface_locus",
     "plot_torques",
     "report",
     "rolling_ellipsoid",

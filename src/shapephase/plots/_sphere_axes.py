@@ -23,6 +23,7 @@ _BEHIND = 0.3  # order in depth of background curves, below the others of their 
 _TEXT_ROOM = 0.17  # [radii of the sphere] between texts
 _VISIBLE_AREA = 5e-3  # [sr] a winding number of less is not in the legend
 _AROUND = 1.3  # [radii] half the side of the picture: room for texts beside the sphere
+_MARGIN = 0.08  # of the farthest point of a picture in space
 _LIMB = -1e-9  # [1] height over the limb's plane: rounding on the limb is on the near side
 
 
@@ -60,6 +61,49 @@ class ParallelAxes:
         """Draw a curve (N, 3) of which `near` (N,) is seen; the rest is dimmed, and one unit deeper."""
         for piece, front in _pieces(points, near):
             self._draw(piece, front, label, zorder=depth if front else depth - 1.0, **style)
+
+    def fill(self, corners: Array, face: str, edge: str, *, depth: float, hull: bool = False) -> None:
+        """Fill a polygon (N, 3), or the outline of a convex body with these corners."""
+        look = {"facecolor": face, "edgecolor": edge, "linewidth": 0.8, "alpha": 0.6, "zorder": depth}
+        if self.solid:
+            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+            # The apex of a cone is the first corner, and its sides are triangles.
+            sides = [corners[[0, k, k + 1]] for k in range(1, len(corners) - 1)] if hull else [corners]
+            self.ax.add_collection3d(Poly3DCollection(sides, **look))
+            return
+        from matplotlib.patches import Polygon
+
+        flat = corners @ self.screen.T
+        self.ax.add_patch(Polygon(_hull(flat) if hull else flat, closed=True, **look))
+
+    def mark(self, point: Array, label: str, **style: Any) -> None:
+        """Draw a marker at (3,)."""
+        look = {"linestyle": "none", "markeredgecolor": "white", "markeredgewidth": 0.7, "zorder": 6.0}
+        (self.named[label],) = self.ax.plot(*self.seen(point[None]), **look, **style)
+
+    def write(self, point: Array, text: str) -> None:
+        """Write at (3,)."""
+        self.ax.text(*self.seen(point), text, fontsize=SMALL + 1, ha="center", va="center", zorder=7)
+
+    def frame(self, reach: Array, title: str, unit: str) -> None:
+        """Set limits around points (N, 3), and the legend below; three-dimensional axes show the unit."""
+        named: dict[str, Any] = {"handles": self.named.values(), "labels": self.named.keys(), "title": title}
+        if self.solid:
+            middle, half = 0.5 * (reach.min(axis=0) + reach.max(axis=0)), 0.5 * float(np.ptp(reach, axis=0).max())
+            for name, centre in zip("xyz", middle, strict=True):
+                getattr(self.ax, f"set_{name}lim")(centre - half, centre + half)
+                getattr(self.ax, f"set_{name}label")(unit, fontsize=SMALL)
+                self.ax.tick_params(axis=name, labelsize=SMALL)
+            self.ax.set_box_aspect((1.0, 1.0, 1.0))
+            finish(self.ax, loc="upper center", bbox_to_anchor=(0.5, -0.06), **named)
+        else:
+            flat = reach @ self.screen.T
+            low, high = flat.min(axis=0), flat.max(axis=0)
+            room = _MARGIN * float((high - low).max())
+            self.ax.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room), aspect="equal")
+            self.ax.set_axis_off()
+            finish_below(self.ax, **named)
 
     def _draw(self, points: Array, near: bool, label: str | None, **style: Any) -> None:
         from matplotlib.lines import Line2D
@@ -217,3 +261,22 @@ def _clipped(polygon: Array, towards: Array) -> Array:
 def _outward(place: Array) -> Array:
     distance = float(np.linalg.norm(place))
     return place / distance if distance > 0.05 else np.array([0.0, 1.0])
+
+
+def _hull(points: Array) -> Array:
+    """The convex hull of points of a plane, counterclockwise (Andrew 1979): (N, 2) -> (M, 2)."""
+    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
+    found: list[Array] = []
+    for run in (ordered, ordered[::-1]):
+        chain: list[Array] = []
+        for point in run:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        found += chain[:-1]
+    return np.array(found or [points[0]])
+
+
+def _turn(start: Array, corner: Array, end: Array) -> float:
+    (a, b), (c, d) = corner - start, end - corner
+    return float(a * d - b * c)

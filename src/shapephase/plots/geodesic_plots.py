@@ -1,4 +1,4 @@
-"""Figures of conjugate points: on the Serret-Andoyer surface, on an ellipsoid of revolution, on SO(3)."""
+"""Figures of geodesics: conjugate points and returns on surfaces of revolution, conjugate points on SO(3)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import number_argument
+from ..arguments import check_object, number_argument
 from ..arrays import Array, Integers, finite_array
 from ..errors import ShapeError
 from ..letters import value_text
@@ -17,10 +17,11 @@ from ..rigid_body.geodesics import (
     SurfaceOfRevolution,
     conjugate_locus,
     conjugate_points,
-    ellipsoid,
+    cut_locus,
     extremal,
     left_invariant_metric,
     serret_andoyer_metric,
+    surface_of_metric,
 )
 from .plot_style import BLACK, BLUE, GREY, SERIES, SKY, SMALL, check_axes, check_flat_axes, finish
 
@@ -29,6 +30,11 @@ if TYPE_CHECKING:
 
 _POINTS = 400  # of a curve: no corner is seen at the width of a page
 _NEAREST = 2e-3  # last p of a locus, from the separatrix' (theta infinite) to the equator's
+_WIDEST = 2.0 * np.pi  # [rad] from the centre of a locus: one that tends to a parallel never ends
+_HIGHEST = 2.0  # potential that is drawn
+_ROUNDING = 1e-12
+_FIRST = 0.05  # square root of the least share of p above the separatrix
+_APART = 0.25  # [height] by which the curves of two scales are kept apart
 _TRIANGLE = 3  # corners
 _FAINT: dict[str, Any] = {"color": GREY, "linewidth": 0.6, "alpha": 0.7, "zorder": 1.0}
 
@@ -105,55 +111,161 @@ def plot_conjugate_locus(
     return ax
 
 
-def plot_ellipsoid_locus(
-    ax: Axes, aspect: float, orders: Sequence[int] = (1, 2), *, latitude: float = 0.0, geodesics: int = 40
+def plot_surface_locus(
+    ax: Axes, surface: SurfaceOfRevolution, orders: Sequence[int] = (1,), *, latitude: float = 0.0, geodesics: int = 40
 ) -> Axes:
-    """The caustics of a point on an ellipsoid of revolution: parametric latitude against longitude.
+    """The conjugate loci of a point on a surface of revolution, and its cut locus: latitude against longitude.
 
     Each order about its centre, which is opposite to the start for odd orders, at theta = n pi, and the start itself
-    for even ones; faint the geodesics on their way past the first.
+    for even ones; faint the geodesics on their way past the first. The ordinate is the parametric latitude, whose
+    cosine is the distance from the axis over the equator's. The cut locus is drawn with order 1, where it is known.
 
     Parameters
     ----------
     ax : flat axes
-    aspect : polar over equatorial axis, not 1, where the caustics are points
+    surface : by `ellipsoid`, `surface_of_metric` or `surface_of_stretch`, no sphere, where the loci are points
     orders : n = 1, 2, ... of the conjugate points
-    latitude : of the start, as a length along the meridian of the ellipsoid of unit equator, between its poles
+    latitude : of the start, as a length along the meridian, inside the surface
     geodesics : how many are drawn
 
     Notes
     -----
-    Source: Bonnard, Cots and Shcherbakova 2013, section 2, the ellipsoid; theory.md P3, P5.
+    Source: Bonnard, Cots and Shcherbakova 2013, section 2; theory.md O16, P3, P5, P6.
 
     Examples
     --------
-    >>> ax = sp.plots.column_axes()
-    >>> len(sp.plots.plot_ellipsoid_locus(ax, 0.8, geodesics=4).lines) >= 2
-    True
+    >>> ax, oblate = sp.plots.column_axes(), sp.rigid_body.geodesics.ellipsoid(0.8)
+    >>> ax = sp.plots.plot_surface_locus(ax, oblate, geodesics=4)
+    >>> [text.get_text() for text in ax.get_legend().get_texts()]
+    ['geodesics', 'order 1: 4 cusps', 'cut locus: arc of a parallel']
     """
-    latitude = number_argument(latitude, "latitude", "rad")
+    latitude = number_argument(latitude, "latitude")
     check_flat_axes(ax)
-    surface = ellipsoid(aspect)
-    if aspect == 1.0:
-        raise ShapeError("aspect: on a sphere the caustics are single points; give another one than 1")
+    check_object(surface, "SurfaceOfRevolution", "surface")
+    if surface.has_smooth_poles and surface.curvature_trend() == "constant":
+        raise ShapeError("surface: on a sphere the conjugate loci are single points; give another surface")
     if not isinstance(orders, Sequence | np.ndarray) or not len(orders):
         raise ShapeError(f"orders: at least one is needed, such as (1, 2), got {value_text(orders)}")
-    curves = []
+    curves, directions = [], np.zeros(0)
     for order in orders:
         locus = conjugate_locus(surface, _POINTS, order, latitude)
+        directions = locus.points.direction
         x = _about_centre(locus.points.longitude, locus.points.momentum, order)
-        y = np.arcsin(np.clip(locus.points.height, -1.0, 1.0))
-        curves.append((np.append(x, x[0]), np.append(y, y[0]), f"order {order}: {locus.cusps} cusps"))
-    wide = max(float(np.abs(x).max()) for x, _, _ in curves)
-    bottom, top = min(float(y.min()) for _, y, _ in curves), max(float(y.max()) for _, y, _ in curves)
-    room = 0.12 * max(wide, 0.5 * (top - bottom))
-    _past_first(ax, surface, latitude, geodesics, wide + room)
-    for index, (x, y, label) in enumerate(curves):
-        ax.plot(x, y, label=label, zorder=3.0, **SERIES[index % len(SERIES)])
-    ax.set(xlim=(-wide - room, wide + room), ylim=(bottom - room, top + room), aspect="equal")
+        y = _parametric(locus.points.height)
+        # East and west meet in the directions of the poles, or never.
+        parts = [np.append(np.arange(len(x)), 0)] if surface.has_smooth_poles else np.split(np.arange(len(x)), 2)
+        curves.append(([(x[part], y[part]) for part in parts], f"order {order}: {locus.cusps} cusps"))
+    drawn = np.concatenate([np.stack(part) for parts, _ in curves for part in parts], axis=1)
+    wide = min(float(np.abs(drawn[0]).max()), _WIDEST)
+    room = 0.12 * max(wide, 0.5 * float(np.ptp(drawn[1])))
+    _past_first(ax, surface, latitude, directions[_evenly_chosen(len(directions), geodesics)], wide + room)
+    for index, (parts, label) in enumerate(curves):
+        for x, y in parts:
+            ax.plot(x, y, label=label, zorder=3.0, **SERIES[index % len(SERIES)])
+            label = "_"
+    if 1 in orders:
+        _draw_cut(ax, surface, latitude)
+    ax.set(xlim=(-wide - room, wide + room), ylim=(drawn[1].min() - room, drawn[1].max() + room), aspect="equal")
     ax.set_xlabel(r"$\theta - n\pi$ [rad]", fontsize=SMALL)
     ax.set_ylabel("parametric latitude [rad]", fontsize=SMALL)
-    finish(ax, title=f"ellipsoid of aspect {aspect:.4g}: caustics of a point")
+    finish(ax, title="conjugate and cut locus of a point on a surface of revolution")
+    return ax
+
+
+def plot_potential(ax: Axes, surface: SurfaceOfRevolution | ArrayLike, momenta: ArrayLike | None = None) -> Axes:
+    """V = p^2/m of a surface of revolution against phi, and the points where V = 1, between which extremals oscillate.
+
+    Along an extremal of unit speed phi'^2 + V = 1; one that reaches the top of V below 1 passes the surface's end.
+
+    Parameters
+    ----------
+    ax : flat axes
+    surface : a surface of revolution; or (3,) three different moments [kg m^2], of whose Serret-Andoyer metric
+    momenta : (N,) Clairaut's p, in absolute value at most that of the equator; None: four, the separatrix among them
+
+    Notes
+    -----
+    Source: Bonnard, Cots and Shcherbakova 2013, remark 1 and lemma 4.1; theory.md O2, R5.
+
+    Examples
+    --------
+    >>> len(sp.plots.plot_potential(sp.plots.column_axes(), [3.0, 2.0, 1.0]).lines)  # of each p the curve and both ends
+    9
+    """
+    check_flat_axes(ax)
+    surface, unit = _surface_and_unit(surface)
+    low, high = surface.least_momentum, surface.greatest_momentum
+    shares = np.array([0.0 if low > 0.0 else 0.2, 0.4, 0.7, 1.0])
+    p = low + (high - low) * shares if momenta is None else finite_array(momenta, "momenta", (None,))
+    if np.abs(p).max(initial=0.0) > high * (1.0 + _ROUNDING):
+        raise ShapeError(f"momenta: |p| is at most sqrt(m(0)) = {high:.6g} on the surface, got {value_text(momenta)}")
+    heights = np.sqrt(surface.depth) * np.sin(np.linspace(-0.5, 0.5, _POINTS + 1) * np.pi)
+    heights = heights[1:-1] if surface.end == "pole" else heights
+    phi = surface.latitude(heights)
+    for index, momentum in enumerate(p.tolist()):
+        look = SERIES[index % len(SERIES)]
+        level = momentum**2 / (surface.equator * (1.0 - heights**2))
+        ax.plot(phi, level, label=f"$p$ = {momentum:.4g}".replace("-", "−"), **look)
+        turn = 1.0 - (momentum / high) ** 2
+        if turn <= surface.depth * (1.0 + _ROUNDING):
+            end = float(surface.latitude(np.sqrt(np.clip(turn, 0.0, surface.depth))))
+            ax.plot(
+                [-end, end], [1.0, 1.0], linestyle="none", marker="o", markersize=3.5, color=look["color"], zorder=4
+            )
+    ax.axhline(1.0, color=BLACK, linewidth=0.8, linestyle=(0, (2, 2)), label="energy, 1")
+    ax.set(xlim=(-surface.reach, surface.reach), ylim=(0.0, _HIGHEST))
+    ax.set_xlabel(rf"$\varphi$ [{unit}]", fontsize=SMALL)
+    ax.set_ylabel(r"$V = p^2/m(\varphi)$ [1]", fontsize=SMALL)
+    finish(ax, title="extremals oscillate where the potential is below 1")
+    return ax
+
+
+def plot_first_return(ax: Axes, surface: SurfaceOfRevolution | ArrayLike, momenta: ArrayLike = ()) -> Axes:
+    """Period T and first return R of a surface's extremals against Clairaut's p, on a scale each.
+
+    T is the length after which an extremal comes back to its latitude and direction, R the longitude that it gains from
+    one passage of the equator to the next; T' = 2 p R', so that both fall or rise together.
+
+    Parameters
+    ----------
+    ax : flat axes; a twin of them is added to their figure
+    surface : a surface of revolution; or (3,) three different moments [kg m^2], of whose Serret-Andoyer metric
+    momenta : (N,) p > 0 that are marked, of extremals that oscillate
+
+    Notes
+    -----
+    Source: Bonnard, Cots and Shcherbakova 2013, definition 2.4, lemma 2.8; theory.md O8, O14, R11.
+
+    Examples
+    --------
+    >>> ax = sp.plots.plot_first_return(sp.plots.column_axes(), sp.rigid_body.geodesics.ellipsoid(0.8))
+    >>> len(ax.figure.axes)
+    2
+    """
+    check_flat_axes(ax)
+    surface, unit = _surface_and_unit(surface)
+    low, high = surface.least_momentum, surface.greatest_momentum
+    marked = finite_array(momenta, "momenta", (None,))
+    if marked.size:
+        surface.parameters(marked)
+    # Denser towards the separatrix, where both may grow without bound.
+    p = low + (high - low) * np.linspace(_FIRST, 1.0, _POINTS // 2) ** 2
+    twin: Any = ax.twinx()
+    handles = []
+    for axes, function, look, label, below in (
+        (ax, surface.period, SERIES[0], f"period $T$ [{unit}]", _APART),
+        (twin, surface.first_return, SERIES[1], "first return $R$ [rad]", 0.0),
+    ):
+        handles += axes.plot(p, function(p), label=label, **look)
+        if marked.size:
+            axes.plot(marked, function(marked), linestyle="none", marker="o", markersize=3.5, color=look["color"])
+        axes.set_ylabel(label, fontsize=SMALL)
+        axes.tick_params(labelsize=SMALL)
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(bottom - below * (top - bottom), top + (_APART - below) * (top - bottom))
+    ax.set_xlim(low, high)
+    ax.set_xlabel(f"Clairaut's $p$ [{unit}]", fontsize=SMALL)
+    finish(ax, handles=handles)
     return ax
 
 
@@ -238,20 +350,44 @@ def _about_centre(longitude: Array, momentum: Array, order: int) -> Array:
     return longitude - np.where(momentum < 0.0, -1.0, 1.0) * order * np.pi
 
 
-def _past_first(ax: Any, surface: SurfaceOfRevolution, latitude: float, geodesics: int, reach: float) -> None:
-    """Draw extremals in evenly spread directions, from the start to `reach` past the last first conjugate point."""
-    chosen = _evenly_chosen(_POINTS, geodesics)
-    directions = 2.0 * np.pi * (np.arange(len(chosen)) + 0.5) / max(len(chosen), 1)
+def _parametric(height: ArrayLike) -> Array:
+    """The parametric latitude of y [rad]."""
+    return np.arcsin(np.clip(height, -1.0, 1.0))
+
+
+def _past_first(ax: Any, surface: SurfaceOfRevolution, latitude: float, directions: Array, reach: float) -> None:
+    """Draw extremals from the start to `reach` past the last first conjugate point that is seen."""
     if not len(directions):
         return
     first = conjugate_points(surface, directions, 1, latitude)
-    times = np.linspace(0.0, float(first.time.max()) + reach, _POINTS)
+    length = min(float(first.time.max()), np.pi * surface.greatest_momentum * _WIDEST)
+    times = np.linspace(0.0, length + reach * surface.greatest_momentum, _POINTS)
     place, longitude, _ = extremal(surface, directions, latitude).state(times)
     x = _about_centre(longitude, first.momentum[:, None], 1)
     label = "geodesics"
-    for across, up in zip(x, np.arcsin(np.clip(surface.height(place), -1.0, 1.0)), strict=True):
+    for across, up in zip(x, _parametric(surface.height(place)), strict=True):
         ax.plot(across, up, label=label, **_FAINT)
         label = "_"
+
+
+def _draw_cut(ax: Any, surface: SurfaceOfRevolution, latitude: float) -> None:
+    """Draw the cut locus, where it is known."""
+    try:
+        cut = cut_locus(surface, latitude)
+    except ShapeError:
+        return
+    x = np.array(cut.longitudes) - np.pi
+    ax.plot(x, _parametric(surface.height(cut.latitudes)), label=f"cut locus: arc of a {cut.kind}", zorder=4.0,
+            color=BLACK, linewidth=2.4, solid_capstyle="round")  # fmt: skip
+
+
+def _surface_and_unit(given: SurfaceOfRevolution | ArrayLike) -> tuple[SurfaceOfRevolution, str]:
+    """A surface as it is, or of the Serret-Andoyer metric of moments, and the unit of its lengths."""
+    if isinstance(given, SurfaceOfRevolution):
+        return given, "length"
+    metric = serret_andoyer_metric(given)
+    surface = surface_of_metric(lambda phi: (metric.m(phi), metric.m_derivatives(phi)[0]), metric.crest)
+    return surface, r"$\sqrt{\mathrm{kg}}$ m"
 
 
 def _directions(polar: Array, azimuth: Array) -> Array:

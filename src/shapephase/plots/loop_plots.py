@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, whole_argument
+from ..arguments import whole_argument
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
+from ..body.loading import as_body
 from ..display import short_repr
 from ..errors import OpenPathError, ShapeError
 from ..letters import value_text
-from ..shape_space.body_path import check_closed, route_along
+from ..shape_space.body_path import as_path, check_closed, route_along
 from ..shape_space.connection import curvature, horizontal_lift, mechanical_connection
 from ..shape_space.curvature_field import curvature_along
 from ..shape_space.shape_path import CLOSED, ShapePath
@@ -105,8 +106,6 @@ class LoopFlux:
 
 def loop_flux(body: Body, path: ShapePath, joints: Sequence[str | int] | str | None = None) -> LoopFlux:
     """Return what a loop encloses and the turn that it makes. Arguments and errors as `plot_loop`."""
-    check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
     route = route_along(body, path)
     check_smooth(body.chain.follows, "the curvature needs")
     check_closed(body, route)
@@ -132,8 +131,8 @@ def loop_flux(body: Body, path: ShapePath, joints: Sequence[str | int] | str | N
 
 def plot_loop(
     ax: Axes,
-    body: Body,
-    path: ShapePath,
+    body: Body | str,
+    path: ShapePath | str,
     joints: Sequence[str | int] | str | None = None,
     *,
     axis: str | ArrayLike | None = None,
@@ -175,6 +174,8 @@ def plot_loop(
     = −64.4° flux in this plane (cone of all joints −64.4°)
     +0.0° by other joints, +1.1° by the order of turns
     """
+    body = as_body(body)
+    path = as_path(path, body)
     flux = loop_flux(body, path, joints)
     count = whole_argument(postures, "postures", 0)
     draw_loop_flux(ax, body, path, flux, axis, count)

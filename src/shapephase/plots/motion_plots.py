@@ -1,24 +1,26 @@
-"""Figures in time: phases, attitude, energy, and the deformation behind them."""
+"""Figures in time: phases, attitude, energy, torques, and the deformation behind them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_choice, check_object
+from ..arguments import check_choice, check_object, names_argument
 from ..arrays import Array, Integers
 from ..bounds.energy import energy_along
 from ..deformation.deformation import Deformation
+from ..dynamics.torques import joint_torques
 from ..errors import ShapeError
 from ..phases.momentum_curve import Gauge
 from ..phases.phases import RunningPhases, running_phases
 from ..phases.split_text import CLOSED_GAP
 from ..reconstruction.reconstruction import Motion
 from . import plot_style as style
-from ._joint_styles import plain_text
+from ._joint_styles import MAX_NAMED, joint_place, plain_text, plot_joints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,6 +43,9 @@ _ROOM = 0.05  # of the range of the energies, beyond its ends
 _LEAST = r"$\ell^2\!/2I_1$"
 _SEPARATRIX = r"$\ell^2\!/2I_2$, separatrix"
 _MOST = r"$\ell^2\!/2I_3$"
+_IDLE = 1e-9  # of the largest torque or force: a joint that does nothing
+_TORQUE_UNITS = {"rad": "N m", "m": "N"}
+_TORQUE_LABELS = {"rad": "torques [N m]", "m": "forces [N]"}
 
 
 def plot_phases(
@@ -283,6 +288,50 @@ def plot_energy(
     ax.set_ylim(low, high)
     title = "\n".join(["energy, and the axis that the momentum circles", *beyond])
     style.in_time(ax, (t[0], t[-1]), "energy [J]", loops=motion.deformation.loops, title=title)
+    return ax
+
+
+def plot_torques(
+    ax: Axes, motion: Motion, joints: Sequence[str] | None = None, *, times: ArrayLike | None = None
+) -> Axes:
+    """The torques of the joints in time, and on an axis of their own the forces of those that slide.
+
+    Parameters
+    ----------
+    ax : flat axes; where there are torques and forces, a twin of them is added to their figure
+    motion : of an articulated body, no batch
+    joints : names of those to draw; None: those that do anything. The six with the largest peaks are named, the others
+        are grey
+    times : (N,) where to draw [s]; None: several in each step of the integrator
+
+    Examples
+    --------
+    >>> ax = sp.plots.column_axes()
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> len(sp.plots.plot_torques(ax, motion).lines)  # one for each joint
+    3
+    """
+    style.check_motion_axes(ax, motion)
+    t = style.motion_times(motion, times)
+    found = joint_torques(motion, t)
+    peaks = np.abs(found.torque).max(axis=0)
+    if joints is None:
+        chosen = np.flatnonzero(peaks > _IDLE * peaks.max(initial=0.0))
+        chosen = chosen if len(chosen) else np.arange(len(peaks))
+    else:
+        given = names_argument(joints, "joints", "names")
+        chosen = np.array([joint_place(name, found.joint_names) for name in given], int)
+    if len(chosen) > MAX_NAMED:
+        chosen = chosen[np.argsort(-peaks[chosen], kind="stable")]
+    units = found.joint_units
+    scales = sorted({units[k] for k in chosen}, reverse=True)
+    places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
+    legend = plot_joints(places, t, found.torque, chosen, found.joint_names, units, _TORQUE_UNITS)
+    for unit, twin in list(places.items())[1:]:
+        twin.set_ylabel(_TORQUE_LABELS[unit], fontsize=style.SMALL)
+        twin.tick_params(labelsize=style.SMALL)
+    style.in_time(ax, (t[0], t[-1]), _TORQUE_LABELS[scales[0]] if scales else "", **legend)
     return ax
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,24 +19,24 @@ from ..reconstruction.reconstruction import Motion
 from ..rigid_body.euler_top import EulerTop
 from ..segments.limb_contributions import contributions
 from ..segments.momentum import segment_momentum
-from ..shape_space.body_path import in_joint_order
+from ..shape_space.body_path import as_path, in_joint_order
 from ..shape_space.reach.holonomy_algebra import reachable
 from ..shape_space.shape_path import ShapePath
-from .contribution_plots import plot_shares
 from .loop_plots import HEIGHT as LOOP_HEIGHT
 from .loop_plots import enclosing_pair, plot_loop
 from .momentum_plots import plot_momentum_curve
-from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
+from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases, plot_torques
 from .plot_style import axes_image, column_axes, even_times, write_axes
 from .polhode_plots import plot_herpolhode, plot_polhodes
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .segment_plots import HEIGHT as SEGMENT_HEIGHT
-from .segment_plots import plot_segment_momentum, plot_somersault
+from .segment_plots import plot_segment_momentum, plot_shares, plot_somersault
 from .shape_plots import plot_curvature, plot_reach, plot_shape_path
-from .torque_plots import plot_torques
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+_SHOWN_PER_INCH = 130.0  # pixels in a notebook
 
 
 @dataclass(frozen=True)
@@ -177,6 +178,8 @@ def motion_figure(
     named = kind or ("phases" if motion.momentum.any() else "attitude")
     axes = column_axes(_figure_of(named, motion).height) if ax is None else ax
     FIGURES[named].draw(axes, motion, getattr(motion.deformation.description, "path", None), gauge)
+    if ax is None:
+        axes._repr_png_ = partial(axes_image, axes, "png", _SHOWN_PER_INCH)  # type: ignore[attr-defined]
     return axes
 
 
@@ -203,7 +206,7 @@ def write_figure(
     kind: str,
     motion: Motion,
     out: str | os.PathLike[str],
-    path: ShapePath | None = None,
+    path: ShapePath | str | None = None,
     gauge: Gauge = "horizontal",
 ) -> None:
     """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all.
@@ -232,7 +235,7 @@ def write_figure(
     check_object(motion, "Motion", "motion")
     check_file_name(out, "out")
     if path is not None:
-        check_object(path, "ShapePath", "path")
+        path = as_path(path)
     image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix(".").lower())
     write_whole(out, lambda stream: stream.write(image))
 

@@ -102,7 +102,7 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     return Figure(figsize=(COLUMN, inches), layout="constrained").add_subplot(projection=projection)
 
 
-def axes_image(ax: Any, ending: str) -> bytes:
+def axes_image(ax: Any, ending: str, resolution: float = _RESOLUTION) -> bytes:
     """The figure of some axes as "svg", "pdf" or "png", without a date, so that equal figures give equal files."""
     stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
     for artist in ax.figure.findobj(_is_long):
@@ -113,7 +113,7 @@ def axes_image(ax: Any, ending: str) -> bytes:
     # In one piece, a curve that crosses itself very often is more than the rasterizer holds.
     # And a letter that the font has not is an empty frame in the figure.
     with quiet(*_NO_GLYPH), rc_context({"agg.path.chunksize": _RASTER_PIECE}):
-        ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
+        ax.figure.savefig(stream, format=ending, dpi=resolution, metadata=stamp)
     return stream.getvalue()
 
 

@@ -25,11 +25,11 @@ from .plot_style import BLACK, BLUE, GREEN, ORANGE, SKY, SMALL, VERMILION, check
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LARGEST = {"color": BLUE, "linestyle": "-", "linewidth": 0.9}
-_SMALLEST = {"color": VERMILION, "linestyle": (0, (4, 1.5)), "linewidth": 0.9}
-_SEPARATRIX = {"color": BLACK, "linestyle": "-", "linewidth": 1.6}
+LARGEST = {"color": BLUE, "linestyle": "-", "linewidth": 0.9}
+SMALLEST = {"color": VERMILION, "linestyle": (0, (4, 1.5)), "linewidth": 0.9}
+SEPARATRIX = {"color": BLACK, "linestyle": "-", "linewidth": 1.6}
 _AT_REST = {"color": ORANGE, "linestyle": (0, (1, 1)), "linewidth": 2.4}
-_OWN = {"color": GREEN, "linestyle": "-", "linewidth": 2.8}
+OWN = {"color": GREEN, "linestyle": "-", "linewidth": 2.8}
 _HEADS = np.array([0.25, 0.7])  # [length of a separatrix] arrowheads along it
 _TAIL = 10.0  # [1/rate] from its crest: exp(-10) is within a line's width of the foot
 _SEPARATRIX_END = 1e-5  # [rad] short of a quarter turn, where the elliptic integral is infinite
@@ -69,11 +69,11 @@ def plot_polhodes(
     points = equilibria(moments)
     sphere = SphereAxes(ax, view)
     levels = spread_energies(moments) if energies is None else np.atleast_1d(finite_array(energies, "energies"))
-    draw_polhodes(sphere, moments, levels, np.eye(3), _LARGEST, _SMALLEST)
+    draw_polhodes(sphere, moments, levels, np.eye(3), LARGEST, SMALLEST)
     kinds = {point.kind for point in points}
     if "saddle" in kinds:
         for curve in heteroclinics(moments):
-            sphere.curve(curve, "separatrix", **_SEPARATRIX)
+            sphere.curve(curve, "separatrix", **SEPARATRIX)
             sphere.arrows(curve, len(curve) * _HEADS, BLACK)
     elif "centre" in kinds:
         around = np.linspace(0.0, 2.0 * np.pi, 181)[:, None]
@@ -217,7 +217,7 @@ def _own_polhode(sphere: SphereAxes, top: EulerTop) -> None:
     orbit = top.orbit
     if top.regime not in ("steady", "spherical"):
         points = top.body_momentum(polhode_times(top)) @ top.axes / top.magnitude
-        sphere.curve(points, "this top", **_OWN)
+        sphere.curve(points, "this top", **OWN)
     sphere.point(orbit.start / orbit.magnitude, "$t = 0$", marker="*", color=GREEN, markersize=11)
 
 

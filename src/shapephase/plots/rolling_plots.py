@@ -13,7 +13,7 @@ from ..errors import ShapeError
 from ..rigid_body.euler_top import EulerTop
 from ..rigid_body.poinsot import Poinsot, cones
 from ._sphere_axes import ParallelAxes
-from .plot_style import BLACK, BLUE, GREEN, GREY, SMALL, VERMILION, check_axes, finish, finish_below
+from .plot_style import BLACK, BLUE, GREEN, GREY, VERMILION, check_axes
 from .polhode_plots import herpolhode_times, polhode_times
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ _AROUND = 181  # points of a closed curve: chords stay within a line's width of 
 _MERIDIANS = 6
 _PARALLELS = 5
 _GENERATORS = 24  # of a cone that are drawn
-_MARGIN = 0.08  # of the farthest point of a figure
 _PLANE = 1.15  # half the plane's side, over the herpolhode's radius
 _UNDER = 0.85
 _BEYOND = 1.22  # of the longest semi-axis: reach of a direction, for its name
@@ -89,7 +88,7 @@ def plot_rolling_ellipsoid(
     wide = max(_PLANE * poinsot.annulus[1], *(_UNDER * np.linalg.norm(axes[:2] * poinsot.semi_axes, axis=1)))
     corners = wide * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     floor = np.array([0.0, 0.0, -height])
-    _filled(space, corners + floor, "#F1EEE4", "#C9C2AE", depth=0.5)
+    space.fill(corners + floor, "#F1EEE4", "#C9C2AE", depth=0.5)
     if poinsot.annulus[1] > 0.0:
         body = so3.apply(top.attitude(moment), poinsot.polhode(polhode_times(top))) @ frame.T
         space.line(body, ellipsoid.faces(body, space.eye), "polhode", depth=4.0, **_POLHODE)
@@ -101,14 +100,14 @@ def plot_rolling_ellipsoid(
     below = np.array([0.0, 0.0, -_BELOW * height])
     space.line(np.stack([np.zeros(3), floor]), inside, r"momentum $\mu$, normal of the plane", depth=3.8, **_MU)
     space.line(np.stack([floor, below]), np.ones(2, dtype=bool), None, depth=0.4, **_MU)
-    _point(space, contact, "point of contact", marker="o", color=GREEN, markersize=6.5)
-    _write(space, _BEYOND * below, r"$\mu$")
+    space.mark(contact, "point of contact", marker="o", color=GREEN, markersize=6.5)
+    space.write(_BEYOND * below, r"$\mu$")
     for number, column in enumerate(axes.T):
         end = _BEYOND * poinsot.semi_axes[number] * column * np.copysign(1.0, column @ space.eye)
         if end[2] > -height:
-            _write(space, end, f"$I_{number + 1}$")
+            space.write(end, f"$I_{number + 1}$")
     reach = np.concatenate([corners + floor, ellipsoid.box(), _BEYOND * below[None]])
-    _finish(space, reach, f"the ellipsoid of inertia rolls on its plane; t = {moment:.4g} s")
+    space.frame(reach, f"the ellipsoid of inertia rolls on its plane; t = {moment:.4g} s", "[rad/s]")
     return ax
 
 
@@ -166,7 +165,7 @@ def plot_cones(ax: Axes, top: EulerTop, time: float = 0.0, *, view: tuple[float,
         (omega, r"angular velocity $\omega$", r"$\omega$", _OMEGA),
     ):
         space.line(np.stack([np.zeros(3), _BEYOND * end]), np.ones(2, dtype=bool), label, depth=5.0, **look)
-        _write(space, (_BEYOND + 0.08) * end, text)
+        space.write((_BEYOND + 0.08) * end, text)
     reach = _BEYOND * np.concatenate([speed * np.stack([up, axis]), omega[None], np.zeros((1, 3))])
     rims = [_rim(direction, speed, half) for direction, half in
             ((axis, found.body_half_angle), (up, found.space_half_angle))]  # fmt: skip
@@ -174,7 +173,7 @@ def plot_cones(ax: Axes, top: EulerTop, time: float = 0.0, *, view: tuple[float,
     if found.space_inside_body:
         kind = "oblate: the space cone is inside the body cone"
     rates = f"precession {found.precession_rate:.4g} rad/s, spin {found.spin_rate:.4g} rad/s".replace("-", "−")
-    _finish(space, np.concatenate([reach, *rims]), f"{kind}\n{rates}; t = {moment:.4g} s")
+    space.frame(np.concatenate([reach, *rims]), f"{kind}\n{rates}; t = {moment:.4g} s", "[rad/s]")
     return ax
 
 
@@ -213,7 +212,7 @@ class _Ellipsoid:
 def _draw_ellipsoid(space: ParallelAxes, ellipsoid: _Ellipsoid) -> None:
     """Draw the outline, the ellipses in the principal planes, and a grid about the axis of the largest moment."""
     if not space.solid:
-        _filled(space, ellipsoid.outline(space.eye), "#DDEAF3", BLACK, depth=2.5)
+        space.fill(ellipsoid.outline(space.eye), "#DDEAF3", BLACK, depth=2.5)
     angles = np.linspace(0.0, np.pi, _MERIDIANS, endpoint=False)
     grid = [_circle(np.array([np.cos(a), np.sin(a), 0.0])) for a in angles]
     around = _circle(np.array([0.0, 0.0, 1.0]))
@@ -233,7 +232,7 @@ def _draw_cone(
 ) -> None:
     """Draw a cone from the origin: its rim, some of its generators, and its sides as a shade."""
     rim = _rim(axis, slant, half)
-    _filled(space, np.vstack([np.zeros((1, 3)), rim]), face, "none", depth=1.5, hull=True)
+    space.fill(np.vstack([np.zeros((1, 3)), rim]), face, "none", depth=1.5, hull=True)
     outwards = (rim - slant * np.cos(half) * axis) * np.cos(half) - slant * np.sin(half) ** 2 * axis
     near = outwards @ space.eye >= _LIMB * slant
     # Into an opening that faces the eye, the whole rim is seen.
@@ -253,68 +252,3 @@ def _circle(normal: Array, count: int = _AROUND) -> Array:
     first = so3.perpendicular(normal)
     angle = np.linspace(0.0, 2.0 * np.pi, count)[:, None]
     return np.cos(angle) * first + np.sin(angle) * np.cross(normal, first)
-
-
-def _filled(space: ParallelAxes, corners: Array, face: str, edge: str, *, depth: float, hull: bool = False) -> None:
-    """Fill a polygon (N, 3), or the outline of a convex body with these corners."""
-    look = {"facecolor": face, "edgecolor": edge, "linewidth": 0.8, "alpha": 0.6, "zorder": depth}
-    if space.solid:
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-        # The apex of a cone is the first corner, and its sides are triangles.
-        sides = [corners[[0, k, k + 1]] for k in range(1, len(corners) - 1)] if hull else [corners]
-        space.ax.add_collection3d(Poly3DCollection(sides, **look))
-        return
-    from matplotlib.patches import Polygon
-
-    flat = corners @ space.screen.T
-    space.ax.add_patch(Polygon(_hull(flat) if hull else flat, closed=True, **look))
-
-
-def _hull(points: Array) -> Array:
-    """The convex hull of points of a plane, counterclockwise (Andrew 1979): (N, 2) -> (M, 2)."""
-    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
-    found: list[Array] = []
-    for run in (ordered, ordered[::-1]):
-        chain: list[Array] = []
-        for point in run:
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
-                chain.pop()
-            chain.append(point)
-        found += chain[:-1]
-    return np.array(found or [points[0]])
-
-
-def _turn(start: Array, corner: Array, end: Array) -> float:
-    (a, b), (c, d) = corner - start, end - corner
-    return float(a * d - b * c)
-
-
-def _point(space: ParallelAxes, point: Array, label: str, **style: Any) -> None:
-    look = {"linestyle": "none", "markeredgecolor": "white", "markeredgewidth": 0.7, "zorder": 6.0}
-    (space.named[label],) = space.ax.plot(*space.seen(point[None]), **look, **style)
-
-
-def _write(space: ParallelAxes, point: Array, text: str) -> None:
-    space.ax.text(*space.seen(point), text, fontsize=SMALL + 1, ha="center", va="center", zorder=7)
-
-
-def _finish(space: ParallelAxes, reach: Array, title: str) -> None:
-    """Set limits around all that is drawn, and the legend below it."""
-    named: dict[str, Any] = {"handles": space.named.values(), "labels": space.named.keys(), "title": title}
-    if space.solid:
-        middle, half = 0.5 * (reach.min(axis=0) + reach.max(axis=0)), 0.5 * float(np.ptp(reach, axis=0).max())
-        for name, centre in zip("xyz", middle, strict=True):
-            getattr(space.ax, f"set_{name}lim")(centre - half, centre + half)
-        space.ax.set_box_aspect((1.0, 1.0, 1.0))
-        for name in "xyz":
-            getattr(space.ax, f"set_{name}label")("[rad/s]", fontsize=SMALL)
-            space.ax.tick_params(axis=name, labelsize=SMALL)
-        finish(space.ax, loc="upper center", bbox_to_anchor=(0.5, -0.06), **named)
-    else:
-        flat = reach @ space.screen.T
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        room = _MARGIN * float((high - low).max())
-        space.ax.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room), aspect="equal")
-        space.ax.set_axis_off()
-        finish_below(space.ax, **named)

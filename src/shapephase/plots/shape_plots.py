@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object, whole_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..errors import ShapeError
 from ..letters import value_text
-from ..shape_space.body_path import in_joint_order
+from ..shape_space.body_path import as_path, in_joint_order
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
@@ -33,8 +34,8 @@ _AXES = "xyz"
 
 def plot_shape_path(
     ax: Axes,
-    path: ShapePath,
-    body: Body | None = None,
+    path: ShapePath | str,
+    body: Body | str | None = None,
     joints: Sequence[str | int] | None = None,
     *,
     times: ArrayLike | None = None,
@@ -59,8 +60,8 @@ def plot_shape_path(
     3
     """
     if body is not None:
-        check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
+        body = as_body(body)
+    path = as_path(path, body)
     style.check_flat_axes(ax)
     t = style.even_times(path, times)
     route, names, units = _named(path, body)
@@ -97,9 +98,9 @@ def plot_shape_path(
 
 def plot_shape_plane(
     ax: Axes,
-    path: ShapePath,
+    path: ShapePath | str,
     joints: Sequence[str | int],
-    body: Body | None = None,
+    body: Body | str | None = None,
     *,
     times: ArrayLike | None = None,
 ) -> Axes:
@@ -119,8 +120,8 @@ def plot_shape_plane(
     True
     """
     if body is not None:
-        check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
+        body = as_body(body)
+    path = as_path(path, body)
     style.check_flat_axes(ax)
     t = style.even_times(path, times)
     route, names, units = _named(path, body)
@@ -133,14 +134,14 @@ def plot_shape_plane(
 
 def plot_curvature(
     ax: Axes,
-    body: Body,
+    body: Body | str,
     joints: Sequence[str | int],
     first: ArrayLike | None = None,
     second: ArrayLike | None = None,
     *,
     axis: str | ArrayLike | None = None,
     shape: ArrayLike | None = None,
-    path: ShapePath | None = None,
+    path: ShapePath | str | None = None,
 ) -> Axes:
     """One component of the curvature over the plane of two joints, with a path of shapes on it.
 
@@ -165,9 +166,9 @@ def plot_curvature(
     >>> sp.plots.plot_curvature(ax, cat, ("waist_pitch", "waist_yaw"), axis="x").get_xlabel()
     'waist_pitch [deg]'
     """
+    body = as_body(body)
     if path is not None:
-        check_object(path, "ShapePath", "path")
-    check_object(body, "Body", "body")
+        path = as_path(path, body)
     style.check_flat_axes(ax)
     places = two_joints(joints, body.joint_names)
     points = None

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arrays import Array, finite_array, lock_arrays
+from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.link_motions import link_motions
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..inertia_tensor import principal_axes
 from ..refinement import least_over
@@ -41,7 +42,7 @@ _NO_SIDES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class AthleteAxes:
     """Axes by which somersaults, tilt and twists are counted, with the source of each.
 
@@ -67,9 +68,6 @@ class AthleteAxes:
     somersault: Array
     up: Array
     reasons: dict[str, str]
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     def __str__(self) -> str:
         """Return the four sources in words, with the directions."""
@@ -107,9 +105,15 @@ def athlete_axes(
     """Return the axes of `Motion.athlete_axes`."""
     reasons: dict[str, str] = {}
     upward = _upward(motion, up, reasons)
-    trunk = _Trunk.of(motion)
+    if hasattr(motion.deformation.description, "original"):
+        raise WrongObjectError(
+            "motion: somersaults are counted by axes of a base, and this deformation is seen from a gauge; "
+            "reconstruct the one without the gauge"
+        )
+    # Looked for only where an axis is to be found by it.
+    trunk = cache(partial(_Trunk.of, motion))
     if longitudinal is None:
-        long = trunk.long_axis()
+        long = trunk().long_axis()
         reasons["longitudinal"] = "the axis of least inertia of the whole body at its straightest"
     else:
         long = _axis(longitudinal, "longitudinal axis", reasons)
@@ -118,7 +122,7 @@ def athlete_axes(
         side = _across(_axis(lateral, "lateral axis", reasons), long)
         if side is None:
             raise ShapeError("longitudinal: an axis across the lateral one is needed, and these two are along one line")
-    elif trunk.body is not None and (leftward := _from_right_to_left(trunk.body, trunk.shape)) is not None:
+    elif (body := trunk().body) is not None and (leftward := _from_right_to_left(body, trunk().shape)) is not None:
         side = _across(leftward, long)
         reasons["lateral"] = _BY_LINKS
     start = motion.initial_attitude
@@ -145,11 +149,6 @@ class _Trunk:
     @classmethod
     def of(cls, motion: Motion) -> _Trunk:
         description = motion.deformation.description
-        if hasattr(description, "original"):
-            raise WrongObjectError(
-                "motion: somersaults are counted by axes of a base, and this deformation is seen from a gauge; "
-                "reconstruct the one without the gauge"
-            )
 
         def width(times: Array) -> Array:
             moments = np.linalg.eigvalsh(description.sample(times)[0])

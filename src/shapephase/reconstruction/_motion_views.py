@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..display import Card, card_html, card_text, error_text, momentum_text, num
 from ..errors import ChartPoleError, MissingExtraError, ShapeError, ShapePhaseError
 from ..offers import offered
 from ._athlete_axes import AthleteAxes, athlete_axes
-from .attitude_angles import Chart, EulerAngles, RotationVectors, continued_angles, euler_chart
+from .attitude_angles import Chart, EulerAngles, RotationVectors, continued_angles, euler_chart, followed
 from .motion_record import write_table
 
 _COLUMNS = (
@@ -373,6 +374,11 @@ class MotionViews:
         columns = [t, *quaternions.T, *self.angular_velocity(t).T, *self.base_position(t, **fall).T]
         return dict(zip(_COLUMNS, columns, strict=True))
 
+    @cached_property
+    def _last_followed(self: Any) -> dict[Any, tuple[Array, Array]]:
+        """The curve of the last chart: whoever looks for an extreme asks for the same angles many times."""
+        return {}
+
     def _continued(self: Any, t: ArrayLike, chart: Chart, seen: tuple[Array, Array] | None = None) -> Array:
         """Chart coordinates of each attitude, continued from the start: times (...) -> batch + (..., 3).
 
@@ -389,7 +395,12 @@ class MotionViews:
                 attitude = so3.quat_product(so3.quat_product(so3.quat_inverse(space), attitude), body)
             return attitude.reshape(-1, len(sampled), 4)
 
-        known = np.append(between.ravel(), ends[-1])
         error = float(np.max(self.error_estimate, initial=0.0))
-        angles = continued_angles(quaternions, known, times.ravel(), chart, error)
+        key = (chart, seen if seen is None else tuple(axes.tobytes() for axes in seen))
+        curve = self._last_followed.get(key)
+        if curve is None:
+            curve = followed(quaternions, np.append(between.ravel(), ends[-1]), chart, error)
+            self._last_followed.clear()
+            self._last_followed[key] = curve
+        angles = continued_angles(quaternions, curve, times.ravel(), chart, error)
         return angles.reshape(*self.batch, *times.shape, 3)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Array, lock_arrays
+from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
+from ..display import frozen
 from ..errors import AccuracyNotReached, TrajectoryError, unknown_name
 from ..integrator.driven_attitude import DrivenAttitude, dop853_attitude
 from ..integrator.many_rotations import rotations_of_each
@@ -48,7 +48,7 @@ class Solution(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class RigidRotation:
     """Attitude relative to the start, S(t), of a batch of free rigid bodies.
 
@@ -64,8 +64,6 @@ class RigidRotation:
     duration: float
     turn: float
     error_estimate: Array
-
-    __post_init__ = lock_arrays
 
     @property
     def times(self) -> Array:
@@ -113,7 +111,7 @@ def _rounding(top: EulerTop, duration: float) -> float:
     return _ROUNDING * (angles if exact or not top.rate else angles + top.condition * half_periods)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Dop853Rotation:
     """Attitude relative to the start by SciPy's integrator, for a batch.
 
@@ -125,8 +123,6 @@ class Dop853Rotation:
 
     turns: tuple[DrivenAttitude, ...]
     times: Array
-
-    __post_init__ = lock_arrays
 
     @property
     def error_estimate(self) -> Array:

@@ -37,7 +37,11 @@ class Chart(Protocol):
 
 
 def continued_angles(
-    quaternions_at: Callable[[Array], Array], known: Array, times: Array, chart: Chart, uncertainty: float
+    quaternions_at: Callable[[Array], Array],
+    curve: tuple[Array, Array],
+    times: Array,
+    chart: Chart,
+    uncertainty: float,
 ) -> Array:
     """Return chart coordinates of attitudes, continued along their motion: times (N,) -> (B, N, 3) [rad].
 
@@ -47,11 +51,11 @@ def continued_angles(
     Parameters
     ----------
     quaternions_at : times (M,) -> (B, M, 4), of any sign
-    known : (K,) times between which attitudes move smoothly and by far less than a turn, first 0, last the end [s]
+    curve : by `followed`, with this chart and uncertainty
     uncertainty : estimated error of the attitudes [rad]
     """
     at_pole = max(_AT_POLE, uncertainty)
-    sampled, quaternions = _followed(quaternions_at, known, chart, at_pole)
+    sampled, quaternions = curve
     further = np.setdiff1d(times, sampled)
     if len(further):
         sampled, quaternions = _merged(sampled, quaternions, further, quaternions_at(further))
@@ -60,10 +64,18 @@ def continued_angles(
     return angles[:, np.searchsorted(sampled, times)]
 
 
-def _followed(
-    quaternions_at: Callable[[Array], Array], known: Array, chart: Chart, at_pole: float
+def followed(
+    quaternions_at: Callable[[Array], Array], known: Array, chart: Chart, uncertainty: float
 ) -> tuple[Array, Array]:
-    """Times between which no vector of the chart turns by more than 30 degrees, and attitudes: (M,) [s], (B, M, 4)."""
+    """Return times between which no vector of the chart turns by more than 30 degrees, and attitudes.
+
+    (M,) [s], (B, M, 4)
+
+    Parameters
+    ----------
+    known : (K,) times between which attitudes move smoothly and by far less than a turn, first 0, last the end [s]
+    """
+    at_pole = max(_AT_POLE, uncertainty)
     times, quaternions = known, quaternions_at(known)
     while True:
         signs = np.where(np.sum(quaternions[:, 1:] * quaternions[:, :-1], axis=-1) < 0.0, -1.0, 1.0)[..., None]

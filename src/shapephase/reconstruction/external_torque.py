@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import breaks_argument, check_choice, check_function
 from ..arrays import Array
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapeError
 from ..letters import value_text
 
 AXES = ("body", "space")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class TorqueState:
     """State of the body at one time, the argument of a torque function.
 
@@ -46,10 +45,8 @@ class TorqueState:
     inertia: Array
     momentum: Array
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class ExternalTorque:
     """External torque about the centre of mass.
 
@@ -71,8 +68,6 @@ class ExternalTorque:
     function: Callable[[TorqueState], ArrayLike]
     axes: str = "body"
     breaks: ArrayLike = ()
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check the arguments. Raises ShapeError, UnknownNameError."""

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import so3
-from ..arrays import Array, lock_arrays
+from ..arrays import Array
 from ..chebyshev import PiecewiseChebyshev, inside, nodes_on, values_to_coefficients
-from ..display import short_repr
+from ..display import frozen
 from ..integrator.driven_attitude import DrivenAttitude
-from ._stored_arrays import check_forced, check_start
 from .external_torque import ExternalTorque, TorqueState
-from .motion_record import FORCED_FORMAT, positive, read_deformation, read_record, stored_deformation, write_record
+from .motion_record import FORCED_FORMAT, read_deformation, read_record, stored_deformation, write_record
 
 if TYPE_CHECKING:
     from .forced_motion import ForcedMotion
@@ -26,7 +24,7 @@ _TORQUE_DEGREE = 16  # on a step: of gravity gradient it misses 1e-15
 _SOLUTION = ("scales", "error_times", "attitude_errors", "state_errors")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class StoredRun:
     """Unit quaternion and other states in time, as a series on each step.
 
@@ -37,9 +35,6 @@ class StoredRun:
     times: Array
     coefficients: Array
 
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
-
     def __call__(self, t: Array) -> Array:
         """States at times: (N,) -> (N, 4 + k)."""
         values = PiecewiseChebyshev(self.times, self.coefficients)(t)
@@ -47,7 +42,7 @@ class StoredRun:
         return values
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class StoredTorque:
     """Torque along a motion, a function of time.
 
@@ -56,9 +51,6 @@ class StoredTorque:
 
     times: Array
     coefficients: Array
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
     def __call__(self, state: TorqueState) -> Array:
         """Torque at the time of a state: (3,)."""
@@ -101,14 +93,10 @@ def read_forced_record(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:
     deformation, _ = read_deformation(header, arrays)
-    if check_start(arrays) != 1 or arrays["spatial_momentum"].ndim != 1:
-        raise ValueError("spatial_momentum: one motion is needed")
-    check_forced(arrays, deformation.duration, _STATE_DEGREE + 1)
     times = arrays["step_times"]
     law = ExternalTorque(
         StoredTorque(times, arrays["step_torques"]), axes=str(header["torque_axes"]), breaks=arrays["torque_breaks"]
     )
-    law.edges(deformation.duration)
     known = {name: arrays[f"solution_{name}"] for name in _SOLUTION}
     run = StoredRun(times, arrays["step_states"])
     return {
@@ -116,7 +104,7 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, A
         "torque_law": law,
         "initial_momentum": arrays["spatial_momentum"],
         "initial_attitude": so3.orthonormalised(arrays["initial_attitude"]),
-        "tolerance": positive(header, "tolerance"),
+        "tolerance": float(header["tolerance"]),
         "solution": DrivenAttitude(run=run, **known, evaluations=int(header["evaluations"])),
     }
 

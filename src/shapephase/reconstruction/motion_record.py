@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Callable, Mapping
@@ -24,7 +25,6 @@ from ..integrator.samples import Perturbed
 from ..integrator.stepped import SteppedRotation
 from ..provenance import provenance
 from ..shape_space.shape_path import ShapePath
-from ._stored_arrays import check_deformation, check_rotation, check_rows, check_start
 from .attitude_angles import continuous
 
 if TYPE_CHECKING:
@@ -88,8 +88,18 @@ def stored_deformation(deformation: Deformation, interpolant: Interpolant) -> tu
 
 
 def write_record(path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
-    """Write an NPZ file with a header."""
+    """Write an NPZ file with a header, which has a digest of all that is in the file."""
+    header = {**header, "digest": _digest(header, arrays)}
     write_whole(path, lambda stream: np.savez(stream, header=np.array(json.dumps(header)), **arrays))
+
+
+def _digest(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> str:
+    """SHA-256 of a header, its own digest left out, and of arrays by name."""
+    whole = hashlib.sha256(json.dumps({**header, "digest": None}, sort_keys=True).encode())
+    for name in sorted(arrays):
+        array = np.asarray(arrays[name])
+        whole.update(f"{name} {array.dtype.str} {array.shape}".encode() + array.tobytes())
+    return whole.hexdigest()
 
 
 def joint_path(deformation: Deformation) -> ShapePath | None:
@@ -156,7 +166,7 @@ def read_record(
         raise no_such_file(where)
     try:
         arrays = npz_arrays(where.read_bytes())
-        header = json.loads(str(arrays["header"]))
+        header = json.loads(str(arrays.pop("header")))
     except (OSError, ValueError, KeyError, RecursionError) as error:
         raise ResultFileError(f"{where}: not a readable motion ({error})") from None
     if not isinstance(header, dict) or "format" not in header:
@@ -167,6 +177,9 @@ def read_record(
             f"{where}: holds {header['format']!r}, this version reads {known!r} here; "
             + ("compute the motion anew" if remedy is None else f"read it with {remedy}")
         )
+    # Files of earlier versions have no digest.
+    if header.get("digest", digest := _digest(header, arrays)) != digest:
+        raise ResultFileError(f"{where}: the motion is damaged, its numbers are not those written; compute it anew")
     try:
         return record(header, arrays)
     except KeyError as error:
@@ -197,17 +210,15 @@ def _of_part(number: int, name: str) -> str:
 
 
 def read_deformation(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> tuple[Deformation, Interpolant]:
-    """Return the deformation made of stored samples, and these. Raises as `check_deformation`."""
-    loops = int(header["loops"])
-    check_deformation(arrays, loops)
-    interpolant = _interpolant(arrays, loops, int(header["interpolant_evaluations"]))
+    """Return the deformation made of stored samples, and these."""
+    interpolant = _interpolant(arrays, int(header["loops"]), int(header["interpolant_evaluations"]))
     breaks = arrays["breaks"]
     deformation = Deformation(
         SampledDescription(interpolant, arrays["centre"], arrays.get("stored")),
         float(breaks[-1]),
         breaks,
         arrays.get("closure"),
-        positive(header, "shape_gap"),
+        float(header["shape_gap"]),
         str(header["deformation"]),
         inputs={str(name): str(digest) for name, digest in header["sha256"].items()},
         made_from=_made_from(header),
@@ -221,19 +232,11 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, A
         "deformation": deformation,
         "momentum": arrays["spatial_momentum"],
         "initial_attitude": so3.orthonormalised(arrays["initial_attitude"]),
-        "tolerance": positive(header, "tolerance"),
+        "tolerance": float(header["tolerance"]),
         "method": str(header["method"]),
         "evaluations": int(header["evaluations"]),
         "solution": _solution(header, arrays, interpolant),
     }
-
-
-def positive(header: Mapping[str, Any], name: str) -> float:
-    """Return a number of the header that is not negative."""
-    value = float(header[name])
-    if not 0.0 <= value < np.inf:
-        raise ValueError(f"{name} is {value}")
-    return value
 
 
 def _made_from(header: Mapping[str, Any]) -> dict[str, Any]:
@@ -248,18 +251,14 @@ def _made_from(header: Mapping[str, Any]) -> dict[str, Any]:
 def _solution(
     header: Mapping[str, Any], arrays: Mapping[str, Any], interpolant: Interpolant
 ) -> SteppedRotation | GroupedRotations:
-    count = check_start(arrays)
     if "parts" not in header:
-        check_rotation(arrays, interpolant.loops, count)
         return _rotation(arrays, interpolant)
     parts: list[RotationPart] = []
     for number, evaluations in enumerate(header["parts"]):
         start = _of_part(number, "")
         own = {name.removeprefix(start): value for name, value in arrays.items() if name.startswith(start)}
-        check_rotation(own, interpolant.loops, len(own["rows"]))
         samples = _interpolant(own, interpolant.loops, int(evaluations))
         parts.append(RotationPart(own["rows"], _rotation(own, samples)))
-    check_rows([part.rows for part in parts], count)
     return GroupedRotations(tuple(parts), int(header["evaluations"]))
 
 

@@ -25,17 +25,17 @@ from ..arguments import (
 )
 from ..arrays import Array, Integers, common_batch, copied_when_read, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
-from ..display import short_repr
+from ..display import frozen, short_repr
 from ..errors import ShapeError, WrongObjectError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.driven_attitude import dop853_attitude
-from ..integrator.families import VariantRotations, rotations_of_variants
 from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
 from ..integrator.lift import Lift, error_turns, lift_along
-from ..integrator.many_rotations import GroupedRotations, assembled
+from ..integrator.many_rotations import GroupedRotations, assembled, rotations_of_variants
 from ..integrator.stepped import SteppedRotation
 from ..run_progress import ProgressCallback, watched
+from ..shape_space.body_path import path_sampler
 from ._motion_views import MotionViews, base_positions
 from ._solvers import METHODS, SOLVERS, Solution, check_pieces
 from .motion_record import read_motion_record, write_motion_record
@@ -48,7 +48,7 @@ _FAMILY_METHODS = ("auto", "spectral")
 _BACKWARD_TOLERANCE = 1e-11  # [rad] of the turn back to the start: a hundredth of the usual one of `reconstruct`
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Sensitivity:
     """Derivatives of the final attitude by the momentum and the initial attitude. Made by `Motion.sensitivity`.
 
@@ -63,9 +63,6 @@ class Sensitivity:
 
     by_momentum: Array
     by_attitude: Array
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
 
 @made_by(
@@ -327,7 +324,7 @@ class MotionFamily(Sequence[Motion]):
     momentum: Array
     initial_attitude: Array
     tolerance: float
-    solution: VariantRotations
+    solution: tuple[SteppedRotation, ...]
 
     __post_init__ = lock_arrays
     __repr__ = short_repr
@@ -366,17 +363,17 @@ class MotionFamily(Sequence[Motion]):
     @property
     def error_estimate(self) -> Array:
         """Estimate of the largest attitude error of each over [0, T]: (N,) [rad]."""
-        return self.solution.error_estimate
+        return np.array([rotation.error_estimate[0] for rotation in self.solution])
 
     @property
     def evaluations(self) -> Integers:
         """How often the locked inertia and internal momentum of each were computed: (N,)."""
-        return self.solution.evaluations
+        return np.array([rotation.interpolant.evaluations for rotation in self.solution], dtype=np.int64)
 
     @property
     def final_attitude(self) -> Array:
         """R(T) of each: (N, 3, 3)."""
-        return self.initial_attitude @ self.solution.end
+        return self.initial_attitude @ np.array([rotation.end[0] for rotation in self.solution]).reshape(-1, 3, 3)
 
     def attitude(self, t: ArrayLike) -> Array:
         """R(t) of each, base axes to inertial axes: times (...) -> (N, ..., 3, 3)."""
@@ -538,7 +535,8 @@ def _family_motions(
         )
     spatial, start = np.broadcast_to(spatial, (count, 3)), np.broadcast_to(start, (count, 3, 3))
     at_start = so3.apply(so3.transpose(start), spatial)
-    solution = rotations_of_variants(deformations.variants(), at_start, tolerance)
+    samplers = (path_sampler(body, deformations.path) for body in deformations.bodies)
+    solution = rotations_of_variants(samplers, at_start, tolerance)
     return MotionFamily(
         deformations=deformations,
         momentum=spatial,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapeError, TrajectoryWarning
 from .reconstruction import Motion
 
@@ -23,7 +22,7 @@ _APART = 0.3  # [rad] a smaller difference between orders of quaternions is nois
 _NEARER = 0.1  # of the difference, left over in the other order of quaternions, where that order is the reason
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class BaseDifference:
     """Difference between a recorded base and a reconstructed one, both turned to agree at the first sample.
 
@@ -39,8 +38,6 @@ class BaseDifference:
     times: Array
     rotation: Array
     angle: Array
-
-    __repr__ = short_repr
 
 
 def base_difference(motion: Motion, times: ArrayLike, attitudes: ArrayLike) -> BaseDifference:

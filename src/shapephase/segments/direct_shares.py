@@ -16,17 +16,17 @@ from numpy.polynomial import legendre
 
 from .. import so3
 from ..arguments import vector_argument
-from ..arrays import Array, Integers, lock_arrays
+from ..arrays import Array, Integers
 from ..body.body import Body
 from ..body.link_motions import link_motions
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription
 from ..deformation.rotors import Rotor, RotorDescription
-from ..display import short_repr
+from ..display import frozen
 from ..error_bars.wheels_along import WheelsAlong, reduced_chain, wheel_frames
 from ..errors import AccuracyNotReached, ChartPoleError, WrongObjectError
 from ..integrator.stepped import SteppedRotation
-from ..reconstruction.attitude_angles import EulerAngles, continued_angles
+from ..reconstruction.attitude_angles import EulerAngles, continued_angles, followed
 from ..reconstruction.reconstruction import Motion
 from ..refinement import least_over
 from ..shape_space.path_series import panel_edges
@@ -42,7 +42,7 @@ _MOST_HALVED = 20  # times: panels of 1e-6 of their first length
 _PARTS = 8  # of a step, at which angles of a link other than the base are continued: joints turn it more
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LinkChart:
     """Somersault, tilt and twist of one link of a body, Rotation = there Ry(somersault) Rx(tilt) Rz(twist) here^T.
 
@@ -59,9 +59,6 @@ class LinkChart:
     pose: Array
     here: Array
     there: Array
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     @classmethod
     def of(cls, motion: Motion, link: str, of_athlete: bool, **given: Any) -> LinkChart:
@@ -114,8 +111,9 @@ class LinkChart:
         def quaternions(sampled: Array) -> Array:
             return so3.quat_from_matrix(self.there.T @ self.attitude(motion, sampled) @ self.here)[None]
 
-        error = float(motion.error_estimate)
-        return continued_angles(quaternions, known, times, EulerAngles("YXZ"), error)[0]
+        chart, error = EulerAngles("YXZ"), float(motion.error_estimate)
+        curve = followed(quaternions, known, chart, error)
+        return continued_angles(quaternions, curve, times, chart, error)[0]
 
     def rates(self, attitudes: Array, about: Array | None) -> tuple[Array, Array]:
         """Rows that turn angular velocities in link axes into rates of angles, and the sine of the tilt.
@@ -179,7 +177,7 @@ def _turns(body: Body, shapes: Array, rates: Array, frame: int) -> Array:
     return link_motions(body.chain, shapes, rates).turns[:, frame]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class DirectShares:
     """What the momentum and each joint did to an angle of a link, along the motion.
 
@@ -211,9 +209,6 @@ class DirectShares:
     total: Array
     largest_tilt: float
     tilt_time: float
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)

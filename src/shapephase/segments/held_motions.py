@@ -1,32 +1,24 @@
-"""Motions of one body in which some groups of joints follow the motion and all others a baseline, many in one batch."""
+"""Motions of one body in which some groups of joints follow the motion, and all others a baseline."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
-from ..arrays import Array, Integers, Mask, finite_array
+from ..arrays import Array, Mask, finite_array
 from ..body.body import Body
 from ..deformation.deformation import Deformation, deformation_along
 from ..deformation.rotors import Rotor, rotors_argument
-from ..error_bars.wheels_along import WheelsAlong
 from ..errors import ShapeError, WrongObjectError, unknown_name
-from ..integrator.families import many_inverted, rotations_of_variants
 from ..integrator.machine_code import expect_work
-from ..integrator.sampling import Sampler
-from ..integrator.smoothness import Smoothness
 from ..letters import value_text
-from ..reconstruction.reconstruction import Motion
-from ..shape_space.body_path import channels_at
+from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import Curve, Swings, most_swings, swings_of
 from ..shape_space.shape_path import ShapePath
-from .direct_shares import articulated_parts, reduced_body, rotors_of
+from .direct_shares import articulated_parts, rotors_of
 from .limbs import WHEELS
 
 MIRRORED = "mirrored"
@@ -64,84 +56,6 @@ class _Mixed:
     def __call__(self, times: Array) -> tuple[Array, Array]:
         (shapes, rates), (others, slopes) = self.first(times), self.second(times)
         return np.where(self.own, shapes, others), np.where(self.own, rates, slopes)
-
-
-@dataclass(frozen=True, eq=False)
-class _MixedVariants:
-    """Paths of one body for the integrator, each mixed from two; planned by the one that follows the first alone."""
-
-    body: Body
-    path: ShapePath
-    baseline: ShapePath
-    own: Mask
-    rotors: tuple[Rotor, ...]
-
-    def __len__(self) -> int:
-        return len(self.own)
-
-    @cached_property
-    def smoothness(self) -> Smoothness | None:
-        """Smoothness of every mixture; None where a path is a function, whose mixtures are scanned one by one, and with
-        wheels, whose momentum may change in time."""
-        if self.rotors:
-            return None
-        if isinstance(self.baseline.curve, _Still):
-            return self.path.smoothness
-        most = most_swings([self.path.swings.most, self.baseline.swings.most])
-        return None if most is None else Smoothness(np.union1d(self.path.breaks, self.baseline.breaks), most)
-
-    @property
-    def model(self) -> Sampler:
-        return self._sampler(np.ones_like(self.own[0]))
-
-    def alone(self, row: int) -> Sampler:
-        return self._sampler(self.own[row])
-
-    def mixed_path(self, own: Mask) -> ShapePath:
-        """The path whose marked columns move and whose others follow the baseline."""
-        still = isinstance(self.baseline.curve, _Still)
-        breaks = self.path.breaks if still else np.union1d(self.path.breaks, self.baseline.breaks)
-        curve, loops = _Mixed(self.path.curve, self.baseline.curve, own), self.path.loops if still else 1
-        return replace(self.path, curve=curve, breaks=breaks, loops=loops, scanner=None, origin=None)
-
-    def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
-        shapes, rates = self._mixtures(self.own[rows], times)
-        flat = shapes.reshape(-1, shapes.shape[-1]), rates.reshape(-1, shapes.shape[-1])
-        values = None if self.rotors else channels_at(self.body, *flat)
-        if values is not None:
-            return values.reshape(len(rows), len(times), 9), np.ones(len(rows), dtype=bool)
-        inertia, momentum = self._reduced.sample(*flat)
-        if self.rotors:
-            momentum = momentum + WheelsAlong(self.body, self.rotors, np.tile(times, len(rows)), *flat).stored
-        batch = (len(rows), len(times))
-        return many_inverted(inertia.reshape(*batch, 3, 3), momentum.reshape(*batch, 3), times)
-
-    @cached_property
-    def _reduced(self) -> Body:
-        return reduced_body(self.body, self.rotors)
-
-    def deformation(self, own: Mask) -> Deformation:
-        """The deformation along the mixed path, with the wheels."""
-        return deformation_along(self.body, self.mixed_path(own), self.rotors)
-
-    def _mixtures(self, own: Mask, times: Array) -> tuple[Array, Array]:
-        (shapes, rates), (others, slopes) = self.path.at_samples(times), self.baseline.at_samples(times)
-        marked = own[:, None]
-        return np.where(marked, shapes, others), np.where(marked, rates, slopes)
-
-    def _sampler(self, own: Mask) -> Sampler:
-        if self.smoothness is None:
-            return self.deformation(own).sampler()
-
-        def mixed(times: Array) -> tuple[Array, Array]:
-            shapes, rates = self._mixtures(own[None], times)
-            return shapes[0], rates[0]
-
-        return Sampler(
-            lambda times: self.body.sample(*mixed(times)),
-            self.smoothness,
-            lambda times: channels_at(self.body, *mixed(times)),
-        )
 
 
 class HeldMotions:
@@ -250,60 +164,46 @@ class HeldMotions:
     def motions(self, subsets: Set[int]) -> dict[int, Motion]:
         """Motions in which the groups of each subset, as bits, follow the motion and the others the baseline.
 
-        Raises as `reconstruct`, with the number of the motion.
+        Raises as `reconstruct`.
         """
-        made: dict[int, Motion] = {}
-
-        def alike(subset: int) -> tuple[bool, ...]:
-            return tuple(self._follows(name, subset) for name in ("body", "duration", WHEELS))
-
         expect_work(momenta=len(subsets))
-        for (own_body, own_duration, own_wheels), some in groupby(sorted(subsets, key=alike), key=alike):
-            masks = list(some)
-            variants = self._variants(masks, own_body=own_body, own_duration=own_duration, own_wheels=own_wheels)
-            sources = [
-                [self.motion if self._follows(name, mask) else self._other for mask in masks]
-                for name in ("momentum", "attitude")
-            ]
-            momenta = np.array([source.momentum for source in sources[0]])
-            starts = np.array([source.initial_attitude for source in sources[1]])
-            at_start = so3.apply(so3.transpose(starts), momenta)
-            rotations = rotations_of_variants(variants, at_start, self.motion.tolerance)
-            for row, mask in enumerate(masks):
-                made[mask] = Motion(
-                    deformation=variants.deformation(variants.own[row]),
-                    momentum=momenta[row],
-                    initial_attitude=starts[row],
-                    tolerance=self.motion.tolerance,
-                    method="spectral",
-                    evaluations=int(rotations.evaluations[row]),
-                    solution=rotations[row],
-                )
-        return made
+        return {
+            mask: reconstruct(
+                self._deformation(mask),
+                self._source("momentum", mask).momentum,
+                self._source("attitude", mask).initial_attitude,
+                tolerance=self.motion.tolerance,
+            )
+            for mask in sorted(subsets)
+        }
 
-    def _follows(self, name: str, subset: int) -> bool:
-        return name not in self.conditions or bool(subset >> self.names.index(name) & 1)
+    def _source(self, name: str, subset: int) -> Motion:
+        """The motion that has a condition in a subset: this one, or the baseline."""
+        is_own = name not in self.conditions or bool(subset >> self.names.index(name) & 1)
+        return self.motion if is_own else self._other
 
-    def _variants(self, masks: list[int], *, own_body: bool, own_duration: bool, own_wheels: bool) -> _MixedVariants:
+    def _deformation(self, mask: int) -> Deformation:
+        """The deformation along the path whose groups in the subset move and whose others follow the baseline."""
         moving, baseline = self._paths
-        body, rotors = self.body, self._rotors[0 if own_wheels else 1]
+        body, breaks, loops = self.body, moving.breaks, moving.loops
         if not self.compares_posture:
-            other_body, baseline = articulated_parts(self._other.deformation)
-            body = body if own_body else other_body
-            duration = self.motion.duration if own_duration else self._other.duration
+            body, _ = articulated_parts(self._source("body", mask).deformation)
+            _, baseline = articulated_parts(self._other.deformation)
+            duration = self._source("duration", mask).duration
             moving, baseline = (
                 path if path.duration == duration else path.stretched(duration / path.duration)
                 for path in (moving, baseline)
             )
             # Both ends of the breaks are the same number.
-            baseline = replace(
-                baseline, duration=moving.duration, breaks=np.append(baseline.breaks[:-1], moving.duration)
-            )
-        own = np.zeros((len(masks), body.n_shape), dtype=bool)
-        own[:, self._shared] = True
+            breaks, loops = np.union1d(moving.breaks, np.append(baseline.breaks[:-1], moving.duration)), 1
+        own = np.zeros(body.n_shape, dtype=bool)
+        own[self._shared] = True
         for place, columns in enumerate(self.columns.values()):
-            own[:, list(columns)] |= (np.array([mask >> place & 1 for mask in masks]) > 0)[:, None]
-        return _MixedVariants(body, moving, baseline, own, _wheels_of(body, rotors, moving.duration))
+            own[list(columns)] |= bool(mask >> place & 1)
+        curve = _Mixed(moving.curve, baseline.curve, own)
+        path = replace(moving, curve=curve, breaks=breaks, loops=loops, scanner=None, origin=None)
+        has_own_wheels = WHEELS not in self.conditions or bool(mask >> self.names.index(WHEELS) & 1)
+        return deformation_along(body, path, _wheels_of(body, self._rotors[not has_own_wheels], path.duration))
 
 
 def _same_wheels(wheels: tuple[Rotor, ...], others: tuple[Rotor, ...]) -> tuple[Rotor, ...]:

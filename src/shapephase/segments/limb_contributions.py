@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_keywords, check_object, number_argument, times_argument, vector_argument, whole_argument
-from ..arrays import Array, lock_arrays, read_only
+from ..arrays import Array, read_only
 from ..body.body import Body
-from ..display import number_with_bar, short_repr
+from ..display import frozen, number_with_bar
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..letters import value_text
 from ..phases.phases import split
@@ -45,7 +45,7 @@ RESULTS = (*ANGLES, "rotation", "phase")
 Result = Callable[[Motion], float]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Contributions:
     """Shares of groups of joints in a result of a motion. Made by `contributions`; printing it shows a table.
 
@@ -99,9 +99,6 @@ class Contributions:
     direct: DirectShares | None
     _pairs: dict[str, tuple[str, str]] = field(repr=False, default_factory=dict)
     _held: HeldMotions | None = field(repr=False, default=None)
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     @property
     def scale(self) -> float:
@@ -332,9 +329,8 @@ def contributions(
         sampled = np.linspace(0.0, motion.duration, _ROWS) if times is None else times_argument(times, motion.duration)
         direct = direct_shares(DirectRates(motion, chart, name, axis, tree.joints), np.ravel(sampled), instant)
     measure = _Measure(name, function, chart, axis, instant / motion.duration)
-    values = _Values(held, measure)
     unit = "" if function is not None else "turns" if name in ("twist", "somersault") else "deg"
-    return _shares(values, grouped, direct, _Choice(name, unit, baseline, instant, chart, orders, seed))
+    return _shares(held, measure, grouped, direct, _Choice(name, unit, baseline, instant, chart, orders, seed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,22 +344,23 @@ class _Choice:
     seed: int
 
 
-def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, choice: _Choice) -> Contributions:
-    held = values.held
+def _shares(
+    held: HeldMotions, measure: _Measure, grouped: JointGroups, direct: DirectShares | None, choice: _Choice
+) -> Contributions:
     names, whole = held.names, held.whole
     bits = _bits(names, grouped.pairs)
     removals = {*bits.values()} | {whole & ~bit for bit in bits.values()} | {0, whole}
     count = len(names)
     interactions = None
     if count <= MOST_EXACT:
-        results = values(range(1 << count))
+        results = _results(held, measure, range(1 << count))
         function, bars = (np.array([results[mask][part] for mask in range(1 << count)]) for part in (0, 1))
         weights = shapley_weights(count)
         shared, errors = weights @ function, np.abs(weights) @ bars
         interactions = shapley_interactions(function)
     else:
         order, before = sampled_orders(count, choice.orders, choice.seed)
-        results = values({int(mask) for mask in before.ravel()} | removals)
+        results = _results(held, measure, {int(mask) for mask in before.ravel()} | removals)
         function = np.array([[results[int(mask)][0] for mask in row] for row in before])
         gains = np.take_along_axis(np.diff(function, axis=1), np.argsort(order, axis=1), axis=1)
         shared, errors = gains.mean(axis=0), gains.std(axis=0, ddof=1) / np.sqrt(len(gains))
@@ -445,16 +442,11 @@ class _Measure:
         return float(value), 2.0 * error / max(abs(np.cos(tilt)), 1e-12), tilt
 
 
-@dataclass(frozen=True, eq=False)
-class _Values:
-    held: HeldMotions
-    measure: _Measure
-
-    def __call__(self, subsets: Iterable[int]) -> dict[int, tuple[float, float, float]]:
-        """Value, error and largest tilt of each subset; the motion itself is not computed again."""
-        wanted = set(subsets)
-        motions = self.held.motions(wanted - {self.held.whole}) | {self.held.whole: self.held.motion}
-        return {mask: self.measure(motions[mask]) for mask in wanted}
+def _results(held: HeldMotions, measure: _Measure, subsets: Iterable[int]) -> dict[int, tuple[float, float, float]]:
+    """Value, error and largest tilt of each subset; the motion itself is not computed again."""
+    wanted = set(subsets)
+    motions = held.motions(wanted - {held.whole}) | {held.whole: held.motion}
+    return {mask: measure(motions[mask]) for mask in wanted}
 
 
 def _conditions(groups: Any) -> tuple[list[str] | None, Any]:
@@ -512,15 +504,10 @@ def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
     motion, chart = held.motion, choice.chart
     body, path = articulated_parts(motion.deformation)
     closes = float(np.abs(path.gap).max(initial=0.0)) <= CLOSED and not motion.momentum.any()
-    if (
-        held.conditions
-        or not closes
-        or not isinstance(choice.baseline, str)
-        or choice.baseline != "first"
-        or chart is None
-    ):
+    at_first = isinstance(choice.baseline, str) and choice.baseline == "first"
+    if held.conditions or not closes or not at_first or chart is None or body.ball_joints:
         return None
-    if choice.of not in ("twist", "somersault") or body.ball_joints:
+    if choice.of not in ("twist", "somersault"):
         return None
     times = np.linspace(0.0, motion.duration, 4097)  # even samples of a smooth loop: their sum converges fast
     shapes, rates = path.curve(times)

@@ -12,11 +12,12 @@ from itertools import pairwise, takewhile
 
 import numpy as np
 
-from ..arguments import check_mapping, check_object
+from ..arguments import check_mapping
 from ..arrays import Array
 from ..body.body import Body
 from ..body.link_motions import link_motions
-from ..display import short_repr
+from ..body.loading import as_body
+from ..display import frozen
 from ..errors import ShapeError, unknown_name
 from ..letters import value_text
 
@@ -274,7 +275,7 @@ def _mirrored(first: Limb, second: Limb) -> bool:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointGroups:
     """Groups of joints whose shares are computed.
 
@@ -296,10 +297,8 @@ class JointGroups:
     rest: tuple[str, ...]
     pairs: dict[str, tuple[str, str]]
 
-    __repr__ = short_repr
 
-
-def joint_groups(body: Body, groups: str | Mapping[str, str | Iterable[str]] = "limbs") -> JointGroups:
+def joint_groups(body: Body | str, groups: str | Mapping[str, str | Iterable[str]] = "limbs") -> JointGroups:
     """Return groups of a body's joints: its limbs, its joints, or those that patterns of names choose.
 
     Parameters
@@ -321,7 +320,7 @@ def joint_groups(body: Body, groups: str | Mapping[str, str | Iterable[str]] = "
     >>> sp.segments.joint_groups(sp.load_body("satellite"), {"arm": "arm_*"}).rest
     ('boom_extension', 'left_wing_drive', 'right_wing_drive', 'wheel_spin')
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     tree = SegmentTree(body)
     if isinstance(groups, str):
         if groups not in GROUPINGS:

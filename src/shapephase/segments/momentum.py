@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_choice, check_object, positive_argument, times_argument
-from ..arrays import Array, finite_array, lock_arrays
+from ..arguments import check_choice, positive_argument, times_argument
+from ..arrays import Array, finite_array
 from ..body import Body, visuals
 from ..body.link_motions import link_motions
+from ..body.loading import as_body
 from ..deformation.deformation import articulated
-from ..display import short_repr
+from ..display import frozen, short_repr
 from ..dynamics.moving_body import needed_body_and_path
 from ..errors import ShapeError, TrajectoryError, TrajectoryWarning, WrongObjectError
 from ..letters import value_text
@@ -85,7 +86,7 @@ class Normalisation:
     __repr__ = short_repr
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class FlightMomentum:
     """Whole momentum in one flight.
 
@@ -117,11 +118,8 @@ class FlightMomentum:
     relative_to: str
     more_than_noise: bool
 
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class SegmentMomentum:
     """Angular momentum about the centre of mass of the whole body, at N times, along C axes.
 
@@ -163,9 +161,6 @@ class SegmentMomentum:
     normalisation: Normalisation | None
     flights: tuple[FlightMomentum, ...]
     as_recorded: bool
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
     @property
     def by_link(self) -> Array:
@@ -225,7 +220,7 @@ class _Source(NamedTuple):
 
 def segment_momentum(
     motion: Any,
-    body: Body | None = None,
+    body: Body | str | None = None,
     *,
     times: ArrayLike | None = None,
     axes: str | ArrayLike = "inertial",
@@ -314,8 +309,8 @@ def segment_momentum(
     if isinstance(motion, Motion):
         source = _of_motion(motion, times)
     else:
+        body = as_body(body)
         if isinstance(motion, RecordedMotion):
-            check_object(body, "Body", "body")
             recorded, given = _of_recording(motion), motion.flight is not None
             if motion.smoothing is not None and motion.smoothing.low_pass is not None and attitude_noise is None:
                 warnings.warn(
@@ -325,9 +320,7 @@ def segment_momentum(
                     stacklevel=2,
                 )
         else:
-            check_object(body, "Body", "body")
             recorded, given = _of_trajectory(motion), False
-        assert body is not None
         if times is not None:
             raise ShapeError("times: a recording has its own; resample it as it is read (resample)")
         levels = None if joint_noise is None else _joint_levels(joint_noise, body)

@@ -10,7 +10,6 @@ from .connection import (
     mechanical_connection,
 )
 from .curvature_field import curvature_on_plane, is_flat, stokes_holonomy
-from .many_paths import FinalAttitudes, final_attitudes
 from .path_noise import PathErrors, path_errors
 from .shape_path import ShapePath
 from .summaries import BodySummary, JointSummary, PartSummary, PathSummary, body_summary, path_summary
@@ -19,7 +18,6 @@ __all__ = [
     "BodySummary",
     "Clearance",
     "ClosestApproach",
-    "FinalAttitudes",
     "HorizontalLift",
     "JointSummary",
     "PartSummary",
@@ -32,7 +30,6 @@ __all__ = [
     "curvature",
     "curvature_on_plane",
     "files",
-    "final_attitudes",
     "holonomy",
     "holonomy_derivative",
     "horizontal_lift",

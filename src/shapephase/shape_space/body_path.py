@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_object
-from ..arrays import Array, Integers, Mask, finite_array
+from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..body.family import BodyFamily
+from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
 from ..errors import OpenPathError, ShapeError, TrajectoryWarning
 from ..integrator import machine_code
-from ..integrator.families import many_inverted
-from ..integrator.link_tree import tree_channels, trees_channels
+from ..integrator.link_tree import tree_channels
 from ..integrator.sampling import Sampler
+from ..offers import offered
 from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import with_crossings
 from .path_series import evenly_divided, panel_edges
@@ -30,14 +30,24 @@ _LOOKS = 65  # times of the first loop of a function, at multiples of the golden
 _LOOKS_OF_A_SWING = 8  # times: a sine is then within 8 % of its largest value
 
 
-def in_joint_order(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
-    """Return the path with its columns in the order of the body's joints. Raises as `ShapePath.matched`."""
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
-    return path.matched(body.joint_names, body.name)
+def as_path(value: ShapePath | str, body: Body | ParticleBody | None = None, name: str = "path") -> ShapePath:
+    """Return a path that a user gave, itself or by a name that `examples.named_motion` takes.
+
+    Raises like it, and WrongObjectError.
+    """
+    if isinstance(value, str):
+        return offered("ShapePath.by_name")(value, body)
+    check_object(value, "ShapePath", name)
+    return value
 
 
-def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
+def in_joint_order(body: Body | ParticleBody, path: ShapePath | str) -> ShapePath:
+    """Return the path with its columns in the order of the body's joints. Raises as `as_path`, `ShapePath.matched`."""
+    body = as_body_or_particles(body)
+    return as_path(path, body).matched(body.joint_names, body.name)
+
+
+def route_along(body: Body | ParticleBody, path: ShapePath | str) -> ShapePath:
     """Return the path in the order of the body's joints, with breaks where the body's motion is less smooth.
 
     Raises as `in_joint_order` and `with_crossings`.
@@ -45,7 +55,7 @@ def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
     return with_crossings(body, in_joint_order(body, path))
 
 
-def users_route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
+def users_route_along(body: Body | ParticleBody, path: ShapePath | str) -> ShapePath:
     """Return `route_along` of a path that a user gave. Warns as `warn_of_degrees`."""
     route = route_along(body, path)
     warn_of_degrees(body, route)
@@ -112,30 +122,6 @@ def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array
     if isinstance(body, ParticleBody) or not body.chain.has_rows or not machine_code.is_used():
         return None
     return tree_channels(body.chain.rows, shapes, rates)
-
-
-class FamilyVariants:
-    """The bodies of a family along one path with columns in their order, planned by the one they were made from."""
-
-    def __init__(self, family: BodyFamily, path: ShapePath) -> None:
-        self._family, self._path = family, path
-        self.model = path_sampler(family.body, path)
-
-    def __len__(self) -> int:
-        """Number of bodies."""
-        return len(self._family)
-
-    def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
-        """I^-1 and I^-1 L_o of some at times, and which can be relied on: (V,), (S,) -> (V, S, 9), (V,)."""
-        shapes, rates = self._path.at_samples(times)
-        if machine_code.is_used() and self._family.body.chain.has_rows:
-            masses = self._family.mass[rows]
-            return trees_channels(self._family.body.chain.rows, self._family.rows[rows], masses, shapes, rates)
-        return many_inverted(*self._family.some(rows).sample(shapes, rates), times)
-
-    def alone(self, row: int) -> Sampler:
-        """Sampler of one of them."""
-        return path_sampler(self._family[row], self._path)
 
 
 def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:

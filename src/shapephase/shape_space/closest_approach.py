@@ -11,8 +11,9 @@ from ..arguments import check_object
 from ..arrays import Array, Integers, Mask
 from ..body.body import Body
 from ..body.collisions.geometry import CollisionGeometry, Postures, collision_geometry
+from ..body.loading import as_body
 from ..chebyshev import inside, nodes_on, values_to_coefficients
-from ..display import short_repr
+from ..display import frozen, short_repr
 from ..errors import ShapeError
 from ..letters import value_text
 from .body_path import users_route_along
@@ -49,7 +50,7 @@ class ClosestApproach:
         return f"{distance_text(self.links, self.distance)} at {self.time:.6g} s"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Clearance:
     """Least distances of pairs of links along a path. Made by `clearance`.
 
@@ -62,11 +63,9 @@ class Clearance:
     approaches: tuple[ClosestApproach, ...]
     geometry: CollisionGeometry
 
-    __repr__ = short_repr
-
 
 def clearance(
-    body: Body, path: ShapePath, *, below: float = np.inf, geometry: CollisionGeometry | None = None
+    body: Body | str, path: ShapePath | str, *, below: float = np.inf, geometry: CollisionGeometry | None = None
 ) -> Clearance:
     """Return how near each pair of links comes along a path, and when.
 
@@ -97,7 +96,7 @@ def clearance(
     >>> nearest.links, round(nearest.distance, 4)
     (('trunk_rear', 'rear_left_lower_leg'), -0.0223)
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     if not isinstance(below, int | float | np.number) or np.isnan(below):
         raise ShapeError(f"below: a distance in m is needed, got {value_text(below)}")
     route = users_route_along(body, path)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_choice, check_function, check_object, times_argument, tolerance_argument
+from ..arguments import check_choice, check_function, times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
-from ..display import short_repr
+from ..display import frozen
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
@@ -26,7 +26,7 @@ _GAUSS_RULE = np.polynomial.legendre.leggauss(16)  # 16 nodes resolve a few swin
 _PIECES = [2**k for k in range(1, 7)]  # panels per piece, in turn: a change at 64 means an undeclared break
 
 
-def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordinates") -> Array:
+def mechanical_connection(body: Body | ParticleBody | str, shape: ArrayLike, *, of: str = "coordinates") -> Array:
     """Rotation rate of the base that cancels the angular momentum of a joint motion.
 
     A(r) = I(r)^-1 J(r): with zero momentum the base turns at omega = -A(r) rate [rad/s, base axes].
@@ -57,7 +57,7 @@ def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike, *, of: st
     >>> sp.mechanical_connection(cat, np.zeros(3)).round(6).tolist()
     [[0.0, 0.0, 0.5], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     frame = _rate_frame(body, shape, of)
     columns = inverse_inertia(body.locked_inertia(shape)) @ body.momentum_matrix(shape)
     return columns if frame is None else columns @ frame
@@ -69,7 +69,7 @@ def _rate_frame(body: Body | ParticleBody, shape: ArrayLike, of: str) -> Array |
     return None if of == "coordinates" or isinstance(body, ParticleBody) else body.rate_frame(shape)
 
 
-def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordinates") -> Array:
+def curvature(body: Body | ParticleBody | str, shape: ArrayLike, *, of: str = "coordinates") -> Array:
     """Curvature of the mechanical connection, F_ij = d_i A_j - d_j A_i - A_i x A_j.
 
     A small square of side e in the joints i, j, gone round from i to j, turns the body by exp(-e^2 F_ij).
@@ -96,6 +96,7 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordin
     >>> sp.curvature(cat, np.zeros(3))[1, 2].round(6).tolist()  # of waist_pitch and waist_yaw
     [0.0, 0.0625, 0.0]
     """
+    body = as_body_or_particles(body)
     columns, slopes = connection_slopes(body, shape)
     bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
     curvatures = slopes - np.swapaxes(slopes, -2, -3) - bracket
@@ -103,7 +104,7 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordin
     return curvatures if frame is None else np.einsum("...ia,...ijk,...jb->...abk", frame, curvatures, frame)
 
 
-def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Array, Array]:
+def connection_slopes(body: Body | ParticleBody | str, shape: ArrayLike) -> tuple[Array, Array]:
     """Columns A_j of the connection and their exact derivatives d_i A_j: (..., n) -> (..., n, 3), (..., n, n, 3).
 
     Examples
@@ -113,6 +114,7 @@ def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Arra
     >>> print(columns.round(6).tolist(), slopes.shape)
     [[0.0, 0.5, 0.0], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0]] (3, 3, 3)
     """
+    body = as_body_or_particles(body)
     connection = mechanical_connection(body, shape)
     inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     # dA_i = I^-1 (dJ_i - dI_i A), indices (i, axis, j)
@@ -122,7 +124,7 @@ def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Arra
     return np.swapaxes(connection, -1, -2), np.swapaxes(gradient, -1, -2)
 
 
-def holonomy(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9) -> Array:
+def holonomy(body: Body | ParticleBody | str, path: ShapePath | str, tolerance: float = 1e-9) -> Array:
     """The rotation of a body with zero angular momentum whose joints go once round a loop.
 
     Parameters
@@ -151,13 +153,13 @@ def holonomy(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees: it turns over")
     180.000000 degrees: it turns over
     """
-    goal = tolerance_argument(tolerance)
+    body, goal = as_body_or_particles(body), tolerance_argument(tolerance)
     route = users_route_along(body, path)
     check_closed(body, route)
     return _lift(body, route, goal).end[0]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class HorizontalLift:
     """The attitude of a body with zero angular momentum along a path of its joints. Made by `horizontal_lift`.
 
@@ -171,8 +173,6 @@ class HorizontalLift:
     body: Body | ParticleBody
     path: ShapePath
     solution: SteppedRotation
-
-    __repr__ = short_repr
 
     @property
     def duration(self) -> float:
@@ -201,7 +201,7 @@ class HorizontalLift:
         return -so3.apply(mechanical_connection(self.body, shapes), rates).reshape(*times.shape, 3)
 
 
-def horizontal_lift(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9) -> HorizontalLift:
+def horizontal_lift(body: Body | ParticleBody | str, path: ShapePath | str, tolerance: float = 1e-9) -> HorizontalLift:
     """The attitude of a body with zero angular momentum along a path, open or closed: R' = R hat(-A rate), R(0) = 1.
 
     Parameters
@@ -227,7 +227,7 @@ def horizontal_lift(body: Body | ParticleBody, path: ShapePath, tolerance: float
     >>> print(f"{np.degrees(sp.so3.angle(lift.attitude(loop.duration))):.6f} degrees: it turns over")
     180.000000 degrees: it turns over
     """
-    goal = tolerance_argument(tolerance)
+    body, goal = as_body_or_particles(body), tolerance_argument(tolerance)
     route = users_route_along(body, path)
     return HorizontalLift(body, route, _lift(body, route, goal))
 
@@ -237,7 +237,10 @@ def _lift(body: Body | ParticleBody, route: ShapePath, tolerance: float) -> Step
 
 
 def holonomy_derivative(
-    body: Body | ParticleBody, path: ShapePath, variation: Callable[[Array], ArrayLike], tolerance: float = 1e-9
+    body: Body | ParticleBody | str,
+    path: ShapePath | str,
+    variation: Callable[[Array], ArrayLike],
+    tolerance: float = 1e-9,
 ) -> tuple[Array, Array]:
     """The holonomy of a loop, and its exact derivative by parameters that the loop may depend on.
 
@@ -279,7 +282,7 @@ def holonomy_derivative(
     >>> slope.shape
     (1, 3)
     """
-    goal = tolerance_argument(tolerance)
+    body, goal = as_body_or_particles(body), tolerance_argument(tolerance)
     route = users_route_along(body, path)
     check_function(variation, "variation", "a function of times that gives changes of shape (N, m, n)")
     check_closed(body, route)

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, tolerance_argument
+from ..arguments import tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
+from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
 from ..inertia_tensor import inverse_inertia
@@ -34,7 +35,7 @@ _ROWS = 2000  # rays, or pieces of rays, computed together: bounds memory
 _SHARE = 0.01  # of the tolerance for each ray: the sum over the path then keeps it
 
 
-def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
+def is_flat(body: Body | ParticleBody | str, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
     """True where the curvature vanishes, so that small loops of the joints do not turn the body.
 
     Parameters
@@ -59,7 +60,7 @@ def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, toleranc
     >>> sp.is_flat(sp.load_body("cat_two_halves"))
     False
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     goal = finite_array(tolerance, "tolerance")
     if goal.ndim or goal <= 0.0:
         raise ShapeError(f"tolerance: a number above 0 is needed, got {value_text(tolerance)}")
@@ -75,7 +76,7 @@ def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, toleranc
 
 
 def curvature_on_plane(
-    body: Body | ParticleBody,
+    body: Body | ParticleBody | str,
     joints: Sequence[str | int],
     first: ArrayLike,
     second: ArrayLike,
@@ -112,7 +113,7 @@ def curvature_on_plane(
     >>> print(found[0, 0].round(6))
     [1.75 0.   0.  ]
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     i, j = _two_joints(body, joints)
     across, along = finite_array(first, "first"), finite_array(second, "second")
     for name, row in (("first", across), ("second", along)):
@@ -128,7 +129,7 @@ def curvature_on_plane(
 
 
 def stokes_holonomy(
-    body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9, centre: ArrayLike | None = None
+    body: Body | ParticleBody | str, path: ShapePath | str, tolerance: float = 1e-9, centre: ArrayLike | None = None
 ) -> Array:
     """Holonomy of a loop from the curvature inside it, by the non-abelian theorem of Stokes.
 
@@ -174,7 +175,7 @@ def stokes_holonomy(
     >>> print(np.abs(sp.stokes_holonomy(cat, loop) - sp.holonomy(cat, loop)).max().round(8))
     0.0
     """
-    goal = tolerance_argument(tolerance)
+    body, goal = as_body_or_particles(body), tolerance_argument(tolerance)
     route = route_along(body, path)
     if isinstance(body, Body):
         check_smooth(body.chain.follows, "the theorem of Stokes needs")

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_time_steps, names_argument
+from ..arguments import check_time_steps, names_argument, positive_argument, vector_argument
 from ..arrays import Array, check_reach, finite_array
+from ..body.body import Body
+from ..body.particles.point_masses import ParticleBody
 from ..errors import ShapeError, TrajectoryError
 from ..letters import value_text
 from .curves import CLOSED, Fourier, PiecewisePolynomial
@@ -61,6 +63,33 @@ def fourier_curve(mean: ArrayLike, cosines: ArrayLike, sines: ArrayLike, period:
     for values, name in ((middle, "mean"), (a, "cosines"), (b, "sines")):
         check_reach(values, name)
     return Fourier(middle.copy(), a.copy(), b.copy(), period)
+
+
+def circle_coefficients(
+    body: Body | ParticleBody, joints: tuple[str, str], radius: float, centre: ArrayLike | None
+) -> tuple[Array, Array, Array]:
+    """Coefficients of the series of `ShapePath.circle`, within the limits of the joints: (n,), (n, 1), (n, 1)."""
+    size = positive_argument(radius, "radius", "a number in rad or m")
+    first, second = places = [body.joint_index(name) for name in joints]
+    units = [body.joint_units[place] for place in places]
+    if first == second or units[0] != units[1] or units[0] not in ("rad", "m"):
+        found = " and ".join(f"{name} [{unit}]" for name, unit in zip(joints, units))
+        raise ShapeError(f"a circle needs two different joints that both turn or both slide, got {found}")
+    middle = np.zeros(body.n_shape) if isinstance(body, ParticleBody) else body.shape()
+    if centre is not None:
+        middle = vector_argument(centre, "centre", body.n_shape, "rad or m")
+    for place in places:
+        lower, upper = body.joint_limits[place]
+        room = float(min(middle[place] - lower, upper - middle[place]))
+        if size > room:
+            fits = f"radii up to {room:.6g} fit there" if room > 0.0 else "move the centre"
+            raise TrajectoryError(
+                f"{body.joint_names[place]} of {body.name} goes from {lower:.6g} to {upper:.6g} {units[0]}: "
+                f"a circle of {size:.6g} about {middle[place]:.6g} leaves that; {fits}"
+            )
+    cosines, sines = np.zeros((2, body.n_shape, 1))
+    cosines[first], sines[second] = size, size
+    return middle, cosines, sines
 
 
 def same_shape(a: Array, b: Array) -> bool:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, lock_arrays
+from ..arrays import Array
+from ..display import frozen
 
 ORDER = 3  # of the penalized derivative: quintic splines have a smooth second derivative
 PILOT_ORDER = 5  # its spline shows the third derivative at the ends, where a quintic has none
@@ -22,7 +23,7 @@ _WIDTHS_A_DECADE = 6  # tried; a parabola through the best and its neighbours ha
 _ROUNDED = 24  # widths per decade that are used: joints of equal width are smoothed together
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LinearSmoother:
     """f with the least sum of w (y - f)^2 + penalty * integral of (d^order f)^2, of each column by its own penalty.
 
@@ -49,8 +50,6 @@ class LinearSmoother:
     penalties: Array
     order: int = ORDER
     digital: bool = False
-
-    __post_init__ = lock_arrays
 
     @property
     def count(self) -> int:

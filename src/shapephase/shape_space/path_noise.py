@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from math import comb
 
@@ -10,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_object, times_argument
-from ..arrays import Array, finite_array, lock_arrays
-from ..display import short_repr
+from ..arrays import Array, finite_array
+from ..display import frozen
 from ..errors import ShapeError, WrongObjectError
 from ..letters import value_text
+from .body_path import as_path
 from .path_samples import PathSamples, columns_without_samples, path_samples
 from .shape_path import ShapePath
 
@@ -23,7 +23,7 @@ _ROUNDING = 8.0  # units in the last place: what arithmetic leaves of samples th
 _MOST_NUMBERS = 4_000_000  # in memory at once; more times are taken in parts
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class PathErrors:
     """Error bars of joints at some times, each from the noise of its own samples. Made by `path_errors`.
 
@@ -38,9 +38,6 @@ class PathErrors:
     times: Array
     covariance: Array
     bias: Array
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
     @property
     def shape(self) -> Array:
@@ -67,7 +64,7 @@ class PathErrors:
         return np.sqrt(self.covariance[..., which, which] + self.bias[..., which] ** 2)
 
 
-def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) -> PathErrors:
+def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = None) -> PathErrors:
     """Error bars of joints, their rates and accelerations, from the noise of the samples of a path.
 
     The bars of a smoothed recording hold the noise that is left and the bias of smoothing.
@@ -102,7 +99,7 @@ def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) 
     >>> bool(found.rate[0, 0] > 3.0 * found.rate[1, 0])  # more is open at an end
     True
     """
-    check_object(path, "ShapePath", "path")
+    path = as_path(path)
     times = times_argument(t, path.duration).ravel()
     samples, levels = _samples(path), _levels(path, joints)
     rows = max(samples.count * path.n_shape, samples.curve.coefficients[..., 0].size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -18,9 +18,12 @@ from ..arguments import (
     positive_argument,
     times_argument,
 )
-from ..arrays import Array, lock_arrays, read_only
+from ..arrays import Array, read_only
+from ..body.body import Body
+from ..body.loading import as_body_or_particles
+from ..body.particles.point_masses import ParticleBody
 from ..card_pictures import MOST_POINTS, curves_picture
-from ..display import Card, card_html, card_text, numbers
+from ..display import Card, card_html, card_text, frozen, numbers
 from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
@@ -43,6 +46,7 @@ from .curves import (
 )
 from .interpolation import (
     ball_columns,
+    circle_coefficients,
     factors_between,
     fourier_curve,
     path_joint_names,
@@ -66,12 +70,12 @@ class PathOrigin(Protocol):
         ...
 
 
-@made_by("read_shape_path(file, body), or ShapePath.fourier, spline, waypoints or function")
-@dataclass(frozen=True, eq=False)
+@made_by("read_shape_path(file, body), or ShapePath.circle, fourier, spline, waypoints or function")
+@frozen
 class ShapePath:
     """A motion of the joints, r(t) on [0, duration].
 
-    Made by `fourier`, `spline`, `waypoints` or `function`, or read from a file. Between two neighbouring
+    Made by `circle`, `fourier`, `spline`, `waypoints` or `function`, or read from a file. Between two neighbouring
     `breaks` the path is smooth; the breaks hold 0 and `duration`.
 
     Attributes
@@ -106,7 +110,6 @@ class ShapePath:
     origin: PathOrigin | None = None
     _seen: KeptValues = field(default_factory=KeptValues, init=False, repr=False)
 
-    __post_init__ = lock_arrays
     __repr__, _repr_html_ = card_text, card_html
 
     @staticmethod
@@ -137,6 +140,43 @@ class ShapePath:
             # Harmonics that are all multiples of one number make a shorter loop, repeated.
             loops=max(1, int(np.gcd.reduce(curve.occupied))),
         )
+
+    @staticmethod
+    def circle(
+        body: Body | ParticleBody | str,
+        first: str,
+        second: str,
+        radius: float,
+        *,
+        centre: ArrayLike | None = None,
+        duration: float = 1.0,
+    ) -> ShapePath:
+        """Circle of two joints, from the first towards the second; the others rest.
+
+        Parameters
+        ----------
+        first, second : joints of the body, both in rad or both in m; the circle begins at the centre + radius of the
+            first
+        radius : [rad or m]; the body turns by about minus pi radius^2 times the curvature of the two joints
+        centre : (n,) its middle, and where the others rest; None: the neutral shape
+        duration : of one round [s]
+
+        Raises
+        ------
+        UnknownNameError, ShapeError
+            For joints that the body does not have, or of different units.
+        TrajectoryError
+            If the circle leaves the limits of a joint; the message has the largest radius that fits.
+
+        Examples
+        --------
+        >>> loop = sp.ShapePath.circle("cat", "waist_pitch", "waist_yaw", 0.5)
+        >>> print(f"{np.degrees(sp.so3.angle(sp.holonomy('cat', loop))):.3f} degrees")
+        32.240 degrees
+        """
+        owner = as_body_or_particles(body)
+        mean, cosines, sines = circle_coefficients(owner, (first, second), radius, centre)
+        return ShapePath.fourier(mean, cosines, sines, duration, joint_names=owner.joint_names)
 
     @staticmethod
     def spline(

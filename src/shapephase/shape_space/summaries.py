@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.coupling import described
-from ..display import short_repr
+from ..body.loading import as_body
+from ..display import frozen
 from ..inertia_tensor import principal_axes, triangle_defect
 from .body_path import path_gap, users_route_along
 from .path_series import joint_extremes, times_of_fastest
@@ -20,7 +19,7 @@ from .shape_path import CLOSED, ShapePath
 _KINDS = {"rad": "revolute", "m": "prismatic", "1": "ball"}
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointSummary:
     """One joint: its kind ("revolute", "continuous" or "prismatic"), limits (infinite where there are none), unit.
 
@@ -33,10 +32,8 @@ class JointSummary:
     upper: float
     unit: str
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class PartSummary:
     """Rigid part: a link and those that are fixed to it. Made by `body_summary`.
 
@@ -53,10 +50,8 @@ class PartSummary:
     centre_of_mass: Array
     principal_moments: Array
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class BodySummary:
     """A body at its neutral shape. Made by `body_summary`.
 
@@ -86,10 +81,8 @@ class BodySummary:
     links: tuple[str, ...]
     parts: tuple[PartSummary, ...]
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class PathSummary:
     """A joint motion for a body. Made by `path_summary`.
 
@@ -119,10 +112,8 @@ class PathSummary:
     gap: Array
     is_loop: bool
 
-    __repr__ = short_repr
 
-
-def body_summary(body: Body) -> BodySummary:
+def body_summary(body: Body | str) -> BodySummary:
     """Summarise a body at its neutral shape.
 
     Examples
@@ -131,7 +122,7 @@ def body_summary(body: Body) -> BodySummary:
     >>> round(summary.mass, 6), len(summary.joints), summary.principal_moments.round(4).tolist()
     (4.0, 23, [0.0119, 0.0799, 0.085])
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     neutral = body.shape()
     inertia = body.locked_inertia(neutral)
     moments, axes = principal_axes(inertia)
@@ -166,7 +157,7 @@ def body_summary(body: Body) -> BodySummary:
     )
 
 
-def path_summary(body: Body, path: ShapePath) -> PathSummary:
+def path_summary(body: Body | str, path: ShapePath | str) -> PathSummary:
     """Summarise a joint motion for a body.
 
     Raises
@@ -183,7 +174,7 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
     >>> summary.duration, summary.is_loop
     (1.0, True)
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     route = users_route_along(body, path)
     lowest, highest, fastest = joint_extremes(route)
     lower, upper = body.joint_limits.T

@@ -1,8 +1,8 @@
 """Computing the cases of a chunk: by batches where these give every case the bits that it has alone, else one by one.
 
-Batches are a family of bodies along one path (in machine code), many momenta on one deformation where only the ends
-are needed, and `final_attitudes`. The bits of a case are always those of a family of one body where inertias are
-varied, and of the single call where they are not: they do not depend on the other cases of the batch.
+Batches are a family of bodies along one path, and many momenta on one deformation where only the ends are needed. The
+bits of a case are always those of a family of one body where inertias are varied, and of the single call where they are
+not: they do not depend on the other cases of the batch.
 """
 
 from __future__ import annotations
@@ -14,20 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from .. import so3
 from ..arrays import Array, Integers
 from ..body.body import Body
 from ..body.loading import load_body
 from ..deformation.deformation import Deformation, DeformationFamily, articulated, rigid
 from ..error_bars.recorded_flight import motion_from_recording
 from ..errors import StudyError
-from ..integrator import machine_code
 from ..letters import printable
 from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.body_path import in_joint_order
 from ..shape_space.files.read import read_recorded_motion
-from ..shape_space.many_paths import final_attitudes
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
@@ -117,27 +114,14 @@ class Evaluator:
         return {output.needs for output in self.study.resolved_outputs}
 
     def _batches(self, cases: list[Case]) -> list[list[int]]:
-        """Return rows that are computed together: those of one path, and for ends those with a path of their own."""
-        if self.study.recording is not None:
-            return [[row] for row in range(len(cases))]
+        """Return rows that are computed together: those of one path, for ends alone or with inertias of their own."""
         groups: dict[Any, list[int]] = {}
         for row, case in enumerate(cases):
-            is_alone = self._needs != {"ends"} and not _has_own_inertias(case)
+            has_own_path = self.study.recording is not None or case.joint_noise is not None
+            is_alone = has_own_path or (self._needs != {"ends"} and not _has_own_inertias(case))
             key = row if is_alone else (id(case.body), *_path_key(case), case.tolerance, case.gauge)
             groups.setdefault(key, []).append(row)
-        batches, own_paths = [], dict[Any, list[int]]()
-        for rows in groups.values():
-            first = cases[rows[0]]
-            if (
-                len(rows) > 1
-                or self._needs != {"ends"}
-                or isinstance(first.body, RigidBody)
-                or _has_own_inertias(first)
-            ):
-                batches.append(rows)
-            else:
-                own_paths.setdefault((id(first.body), first.tolerance), []).extend(rows)
-        return batches + list(own_paths.values())
+        return list(groups.values())
 
     def _compute(self, cases: list[Case], rows: list[int], results: Results) -> None:
         """Compute a batch; where that fails its cases are computed one by one, and the one at fault has a status."""
@@ -161,28 +145,18 @@ class Evaluator:
         momenta = np.array([case.momentum for case in cases])
         attitudes = None if first.attitude is None else np.array([case.attitude for case in cases])
         if _has_own_inertias(first):
-            # Interpreted, sums over a family are one large product, whose order of adding depends on its size.
-            is_batch = first.joint_noise is None and machine_code.is_used()
-            for lot in [slice(len(cases))] if is_batch else [slice(row, row + 1) for row in range(len(cases))]:
-                start = None if attitudes is None else attitudes[lot]
-                motions = reconstruct(self._family(cases[lot]), momenta[lot], start, **settings)
-                if self._needs == {"ends"}:
-                    self._put_ends(rows[lot], *ends_of(motions), results)
-                    continue
-                for number, (case, row) in enumerate(zip(cases[lot], rows[lot], strict=True)):
-                    self._put_motion(motions[number], case, row, results)
+            motions = reconstruct(self._family(cases), momenta, attitudes, **settings)
+            if self._needs == {"ends"}:
+                self._put_ends(rows, *ends_of(motions), results)
+                return
+            for motion, case, row in zip(motions, cases, rows, strict=True):
+                self._put_motion(motion, case, row, results)
         elif self._needs != {"ends"}:
             motion = reconstruct(self._deformation(first), first.momentum, first.attitude, **settings)
             self._put_motion(motion, first, rows[0], results)
-        elif first.joint_noise is None and all(_path_key(case) == _path_key(first) for case in cases):
+        else:
             motion = reconstruct(self._deformation(first), momenta, attitudes, **settings)
             self._put_ends(rows, *ends_of(motion), results)
-        else:
-            body = self._body(first)
-            paths = (self._path(case, body) for case in cases)
-            ends = final_attitudes(body, paths, momenta, attitudes, tolerance=first.tolerance)
-            starts = np.eye(3) if attitudes is None else so3.rotation_argument(attitudes, "attitude")
-            self._put_ends(rows, starts, ends.attitude, ends.error_estimate, results)
 
     def _put_ends(self, rows: list[int], starts: Array, ends: Array, estimates: Array, results: Results) -> None:
         each = list(zip(np.broadcast_to(starts, ends.shape), ends, estimates, strict=True))

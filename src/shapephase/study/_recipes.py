@@ -6,7 +6,6 @@ import importlib
 import inspect
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from ..arguments import inertia_argument, positive_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.loading import load_body
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapePhaseError, StudyError, WrongObjectError, unknown_name
 from ..examples.scenarios import MOTIONS
 from ..files import no_such_file
@@ -31,7 +30,7 @@ from ._identity import body_digest, file_digest, path_digest
 _LONGEST_SHOWN = 80  # characters of a name in a message
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class RigidBody:
     """A body that keeps its shape, as a study takes it.
 
@@ -49,8 +48,6 @@ class RigidBody:
 
     inertia: ArrayLike
     duration: float
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check what came. Raises ShapeError, SingularInertiaError, TrajectoryError."""

@@ -7,7 +7,7 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, fields
+from dataclasses import KW_ONLY, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_mapping, number_argument, tolerance_argument, vector_argument
-from ..arrays import Array, Integers, lock_arrays
+from ..arrays import Array, Integers
 from ..body.body import Body
 from ..body.loading import load_body, loading_options
 from ..deformation.frames import gauge_link
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapePhaseError, StudyError, WrongObjectError, unknown_name
 from ..letters import value_text
 from ..shape_space.files.options import ReadingOptions, check_options
@@ -49,7 +49,7 @@ _TAKEN = ("seal", "status", "error_name", "error_text", "processor", "case", "ch
 _NOT_OF_RIGID = ("motion", "joint_noise", *OF_PARTS)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@frozen(kw_only=True)
 class Case:
     """The numbers that make one case, from which the library's own calls compute it.
 
@@ -82,11 +82,8 @@ class Case:
     inertias: Array | None = None
     joint_noise: float | None = None
 
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False, repr=False)
+@frozen
 class CaseTable:
     """Base of `Study`, which describes the attributes: all that its values depend on, checked."""
 
@@ -113,8 +110,6 @@ class CaseTable:
     length_unit: float | None = None
     person_mass: float | None = None
     recording: Mapping[str, Any] | None = None
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check what came."""

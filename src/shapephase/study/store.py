@@ -16,7 +16,6 @@ import secrets
 import shutil
 import tempfile
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ import numpy as np
 
 from ..arguments import check_choice, check_file_name
 from ..arrays import Integers
-from ..display import short_repr
+from ..display import frozen
 from ..errors import MissingExtraError, OutputFileError, StudyStoreError
 from ..files import write_whole
 from ..provenance import provenance
@@ -41,7 +40,7 @@ _OF_EVERY_STUDY = ("status", *LETTERS, "processor")
 _PROCESSOR_LENGTH = 96  # bytes
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class StudyStore:
     """A store and its contents.
 
@@ -55,8 +54,6 @@ class StudyStore:
 
     path: Path
     attributes: Mapping[str, Any]
-
-    __repr__ = short_repr
 
     @property
     def cases(self) -> int:

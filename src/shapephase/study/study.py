@@ -16,6 +16,7 @@ import numpy as np
 from ..arguments import check_choice, check_file_name, check_flag, check_object
 from ..arrays import Integers
 from ..errors import RunStopped, StudyError
+from ..integrator.stepping import processors
 from ..letters import value_text
 from ..run_progress import ProgressCallback, check_progress
 from ._evaluate import DONE, Evaluator
@@ -158,7 +159,7 @@ class Study(CaseTable):
 
 def _chunks_here(study: Study, missing: Integers, workers: int | None) -> Iterator[ChunkResults]:
     """Yield chunks in the order in which threads or processes of this machine have done them."""
-    count = 1 if workers == 0 else min(workers or _processors(), len(missing))
+    count = 1 if workers == 0 else min(workers or processors(), len(missing))
     pool = Evaluator(study, study.inputs) if workers == 0 else WorkerPool(study, recipe_of(study))
     executor = ThreadPoolExecutor(count)
     # Cases in this process have a thread too: Ctrl-C interrupts the main one, whatever code of the user does with it.
@@ -190,11 +191,6 @@ def _daemon_call(call: Callable[..., Any], *arguments: Any) -> Future[Any]:
 
     threading.Thread(target=run, daemon=True).start()
     return future
-
-
-def _processors() -> int:
-    """Return how many processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _progress_text(done: int, cases: int, failed: int, rate: float) -> str:

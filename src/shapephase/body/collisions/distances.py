@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import check_object
 from ...arrays import Array, finite_array
-from ...display import short_repr
+from ...display import frozen
 from ...errors import ShapeError
 from ..body import Body
+from ..loading import as_body
 from .geometry import CollisionGeometry, Separations, collision_geometry
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LinkDistances:
     """Signed distances of P pairs of links at shapes (..., n). Made by `link_distances`.
 
@@ -32,10 +31,8 @@ class LinkDistances:
     points: Array
     slopes: Array
 
-    __repr__ = short_repr
 
-
-def link_distances(body: Body, shape: ArrayLike, *, geometry: CollisionGeometry | None = None) -> LinkDistances:
+def link_distances(body: Body | str, shape: ArrayLike, *, geometry: CollisionGeometry | None = None) -> LinkDistances:
     """Return the signed distances between the links of a body.
 
     The nearest two solids of two links count, and meshes as their convex hulls.
@@ -63,7 +60,7 @@ def link_distances(body: Body, shape: ArrayLike, *, geometry: CollisionGeometry 
     >>> distances.distance.shape, bool(distances.distance.min() > 0.0)
     ((95,), True)
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     known = collision_geometry(body) if geometry is None else geometry
     check_object(known, "CollisionGeometry", "geometry", call="collision_geometry(body)")
     shapes = finite_array(shape, "shape")

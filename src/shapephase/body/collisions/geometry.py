@@ -15,9 +15,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...arguments import check_file_name, check_object
+from ...arguments import check_file_name
 from ...arrays import Array, Integers
-from ...display import short_repr
+from ...display import frozen
 from ...errors import MissingExtraError, NoCollisionGeometryError, VisualWarning, unknown_name
 from ..body import Body
 from ..drawing.appearance import collision_shapes
@@ -26,6 +26,7 @@ from ..drawing.visual import Visual
 from ..formats.xml_text import listed, read_file, xml_tree
 from ..joint_chain import JointChain
 from ..link_motions import link_motions
+from ..loading import as_body
 
 _GJK_TOLERANCE = 1e-10  # [m] with the usual 1e-6 derivatives of distances are off by 1e-3
 _EPA_TOLERANCES = (1e-6, 1e-4, 1e-2)  # [m] each where the one before failed: at 1e-8 1 of 100 depths is wrong by half
@@ -66,7 +67,7 @@ class Separations:
     normals: Array
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class CollisionGeometry:
     """Convex solids of a body's links, and the pairs of links whose distance counts. Made by `collision_geometry`.
 
@@ -83,8 +84,6 @@ class CollisionGeometry:
     pairs: tuple[tuple[str, str], ...]
     left_out: tuple[tuple[str, str, str], ...]
     missing: tuple[str, ...]
-
-    __repr__ = short_repr
 
     def __getstate__(self) -> dict[str, Any]:
         """Return everything but what is derived: solids of coal cannot be pickled."""
@@ -193,7 +192,7 @@ class CollisionGeometry:
 _kept: WeakKeyDictionary[Body, CollisionGeometry] = WeakKeyDictionary()
 
 
-def collision_geometry(body: Body, *, srdf: str | Path | None = None) -> CollisionGeometry:
+def collision_geometry(body: Body | str, *, srdf: str | Path | None = None) -> CollisionGeometry:
     """Return the convex solids of a body's links, and the pairs of links whose distance counts.
 
     The solids are those of the <collision> elements of its file (colliding geoms of an MJCF), or if it has none those
@@ -222,7 +221,7 @@ def collision_geometry(body: Body, *, srdf: str | Path | None = None) -> Collisi
     >>> len(geometry.pairs), geometry.left_out[0]
     (95, ('lower_trunk', 'left_thigh', 'adjacent'))
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     if srdf is not None:
         check_file_name(srdf, "srdf")
     if body not in _kept:

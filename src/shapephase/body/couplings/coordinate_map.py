@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, lock_arrays
-from ...display import short_repr
+from ...arrays import Array
+from ...display import frozen
 from ...errors import ModelFileError, ShapeError
 from .ball_joints import BallJoint, coordinate_names, rate_names
 from .coupling import Coupling
@@ -31,7 +30,7 @@ class CurvedJoint(NamedTuple):
     terms: tuple[tuple[int, JointFunction], ...]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class CoordinateMap:
     """Coordinates of all k joints of one axis from the n numbers of a shape.
 
@@ -50,10 +49,6 @@ class CoordinateMap:
     offset: Array
     curved: tuple[CurvedJoint, ...] = ()
     balls: tuple[BallJoint, ...] = ()
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
     @property
     def is_linear(self) -> bool:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import check_choice, check_mapping, number_argument
-from ...display import short_repr
+from ...display import frozen
 from ...errors import ShapeError
 from ...letters import value_text
 from . import functions
@@ -18,7 +17,7 @@ from .functions import JointFunction
 _ENDS = ("not-a-knot", "natural", "four points")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Coupling:
     """A joint's coordinate as a sum of functions, each of the coordinate of one other joint.
 
@@ -40,8 +39,6 @@ class Coupling:
 
     start: float = 0.0
     terms: tuple[tuple[str, JointFunction], ...] = ()
-
-    __repr__ = short_repr
 
     @staticmethod
     def constant(value: float) -> Coupling:

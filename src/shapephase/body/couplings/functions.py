@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, Integers, finite_array, lock_arrays
-from ...display import short_repr
+from ...arrays import Array, Integers, finite_array
+from ...display import frozen
 from ...errors import ShapeError
 
 _GAP = 1e-9  # of the sizes on both sides of a knot: more is a jump in the value or the slope
@@ -25,7 +24,7 @@ class Expansion(NamedTuple):
     bend: Array
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointFunction:
     """sum_p coefficients[p, i] (q - centres[i])^p between the knots i - 1 and i; the first and last piece have no end.
 
@@ -37,10 +36,6 @@ class JointFunction:
     knots: Array
     centres: Array
     coefficients: Array
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
     def __call__(self, coordinate: Array) -> Expansion:
         """Value, slope and bend: (...) each; at a knot those of the piece behind it."""

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arguments import check_object
 from ...arrays import Array
 from ...errors import InputFileNotFoundError, MissingExtraError, ModelFileError, VisualWarning
 from ..body import Body
@@ -18,6 +17,7 @@ from ..engines.engine_tree import engine_shapes, expanded
 from ..engines.formats import MJCF, format_of
 from ..formats.urdf import macro_of, rpy_matrix
 from ..formats.xml_text import Node, quoted, read_file, xml_tree
+from ..loading import as_body
 from .limits import within_limits
 from .meshes import MeshFiles
 from .visual import PLAIN, Colour, Visual, part_box, pose_of
@@ -26,7 +26,7 @@ _MOST_FAULTS = 10  # listed by one warning, which fills a screen
 _SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
 
 
-def visuals(body: Body) -> tuple[Visual, ...]:
+def visuals(body: Body | str) -> tuple[Visual, ...]:
     """The shapes to draw of a body, by link.
 
     From its file, read anew: the <visual> elements of a URDF, the geoms of an MJCF. A moving part with mass
@@ -45,7 +45,7 @@ def visuals(body: Body) -> tuple[Visual, ...]:
     >>> len(sp.body.visuals(cat)), sp.body.visuals(cat)[0].kind
     (3, 'cylinder')
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     shapes, doubts, _ = drawn_shapes(body)
     shown = {shape.link for shape in shapes}
     boxes = [part_box(part) for part in body.moving_parts if part.mass > 0.0 and shown.isdisjoint(part.links)]

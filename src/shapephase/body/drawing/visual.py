@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
 
 from ...arguments import number_argument
 from ...arrays import Array, Integers
-from ...display import short_repr
+from ...display import frozen
 from ...inertia_tensor import principal_axes, second_moment
 from ..body import MovingPart
 
@@ -23,7 +23,7 @@ _WATER = 1000.0  # density of the ball that stands for a point mass [kg/m^3]
 _CORNERS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Visual:
     """One shape to draw.
 
@@ -54,8 +54,6 @@ class Visual:
     mesh: Path | None = None
     vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
     faces: Integers = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
-
-    __repr__ = short_repr
 
     @property
     def corners(self) -> Array:

@@ -144,7 +144,7 @@ def plan_command(
         if html is not None:
             work.begin("making the report")
             from ...phases.phases import split
-            from ...plots.report_page import report
+            from ...plots.pages.report_page import report
 
             page = report(
                 result.motion,

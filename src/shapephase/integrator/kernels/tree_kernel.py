@@ -234,43 +234,36 @@ def place_frames(parents, turning, leads, body, shapes, rates, first, frames, sh
 
 
 @kernel
-def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted, lanes, values, reliable):
-    """I^-1 and I^-1 L_o, or I and L_o, of trees that differ in their masses, about the centre of mass, base axes.
+def sample_tree(parents, turning, leads, body, mass, shapes, rates, inverted, lanes, values):
+    """I^-1 and I^-1 L_o, or I and L_o, about the centre of mass, base axes; return whether all rows are reliable.
 
-    parents, turning, leads: as `LinkRows` has them
-    rows: (V, k + 1, NUMBERS) of each tree, their geometry the same
-    masses: (V,) of each tree
+    parents, turning, leads, body, mass: as `LinkRows` has them
     shapes, rates: (N, joints) of all joints
     inverted: whether I^-1 and I^-1 L_o are wanted, not I and L_o
     lanes: LANES
-    values: (V, N, 9) to be filled: xx yy zz yz xz xy, and three of the momentum
-    reliable: (V,) to be filled: whether all rows of a tree are reliable
+    values: (N, 9) to be filled: xx yy zz yz xz xy, and three of the momentum
     """
-    joints, count = len(parents), len(shapes)
+    joints, count, reliable = len(parents), len(shapes), True
     frames, total, centre = np.empty((joints + 1, FRAME * LANES)), np.empty(TOTAL * LANES), np.empty(INERTIA * LANES)
     rate, cosine, sine, shape = np.empty((joints, LANES)), np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    for tree in range(len(rows)):
-        reliable[tree] = True
     for first in range(0, count, LANES):
-        place_frames(parents, turning, leads, rows[0], shapes, rates, first, frames, shape, rate, cosine, sine, lanes)
-        for tree in range(len(rows)):
-            for j in range(TOTAL * LANES):
-                total[j] = 0.0
-            for frame in range(joints + 1):
-                add_link(rows[tree, frame], frames[frame], total, lanes)
-            for j in range(INERTIA * LANES):
-                centre[j] = total[j] / masses[tree]
-            for frame in range(joints + 1):
-                add_point(rows[tree, frame, MASS], frames[frame], centre, total, lanes)
-            for i in range(LANES):
-                if first + i < count:
-                    fine = _write(total, i, inverted, values[tree, first + i])
-                    reliable[tree] = reliable[tree] and fine
+        place_frames(parents, turning, leads, body, shapes, rates, first, frames, shape, rate, cosine, sine, lanes)
+        for j in range(TOTAL * LANES):
+            total[j] = 0.0
+        for frame in range(joints + 1):
+            add_link(body[frame], frames[frame], total, lanes)
+        for j in range(INERTIA * LANES):
+            centre[j] = total[j] / mass
+        for frame in range(joints + 1):
+            add_point(body[frame, MASS], frames[frame], centre, total, lanes)
+        for i in range(LANES):
+            if first + i < count:
+                fine = _write(total, i, inverted, values[first + i])
+                reliable = reliable and fine
+    return reliable
 
 
 def warm() -> None:
-    """Call each kernel with the least that it takes: one frame, one shape."""
-    none, shapes = np.zeros(0), np.zeros((1, 0))
-    values, reliable = np.empty((1, 1, 9)), np.empty(1, dtype=np.bool_)
-    parents, rows, masses = np.zeros(0, dtype=np.uint32), np.ones((1, 1, NUMBERS)), np.ones(1)
-    sample_trees(parents, none, none, rows, masses, shapes, shapes, True, LANES, values, reliable)
+    """Call the kernel with the least that it takes: one frame, one shape."""
+    none, shapes, parents = np.zeros(0), np.zeros((1, 0)), np.zeros(0, dtype=np.uint32)
+    sample_tree(parents, none, none, np.ones((1, NUMBERS)), 1.0, shapes, shapes, True, LANES, np.empty((1, 9)))

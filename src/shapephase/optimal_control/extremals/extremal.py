@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from scipy.integrate import OdeSolution
 
 from ... import so3
-from ...arguments import check_object, made_by, positive_argument, times_argument, tolerance_argument, vector_argument
+from ...arguments import made_by, positive_argument, times_argument, tolerance_argument, vector_argument
 from ...arrays import Array, check_reach
 from ...body.body import Body
+from ...body.loading import as_body_or_particles
 from ...body.particles.point_masses import ParticleBody
 from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
@@ -107,7 +108,7 @@ class Extremal:
 
 
 def extremal(
-    body: Body | ParticleBody,
+    body: Body | ParticleBody | str,
     shape: ArrayLike,
     rate: ArrayLike,
     charge: ArrayLike,
@@ -153,7 +154,7 @@ def extremal(
     >>> print(f"{path.cost:.6f} J s")
     0.002500 J s
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     start, speed = (vector_argument(value, name, body.n_shape) for value, name in ((shape, "shape"), (rate, "rate")))
     check_reach(start, "shape")
     check_reach(speed, "rate")

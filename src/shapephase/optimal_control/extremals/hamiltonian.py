@@ -12,10 +12,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ...arguments import check_object
 from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_no_balls, check_smooth
+from ...body.loading import as_body_or_particles
 from ...body.particles._casadi_positions import symbol_kind
 from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
@@ -66,7 +66,7 @@ class Hamiltonian:
         return casadi.Function("second", parts, [casadi.densify(rows)])
 
 
-def hamiltonian(body: Body | ParticleBody, metric: Any) -> Hamiltonian:
+def hamiltonian(body: Body | ParticleBody | str, metric: Any) -> Hamiltonian:
     """Return the equations of a body; built at its first call, kept as long as the body.
 
     Raises UnknownNameError, and ShapeError where a joint follows others by a function with knots.
@@ -78,7 +78,7 @@ def hamiltonian(body: Body | ParticleBody, metric: Any) -> Hamiltonian:
     >>> print(np.array(equations.metric(np.zeros(3))).diagonal().round(6))
     [0.005   0.005   0.00125]
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     given = metric_argument(body, metric, "metric")
     check_smooth(body.follows, "the equations of extremals need")
     check_no_balls(body.follows, "the equations of extremals need")

@@ -12,6 +12,7 @@ from ... import so3
 from ...arguments import check_object, number_argument, positive_argument, tolerance_argument
 from ...arrays import Array
 from ...body.body import Body
+from ...body.loading import as_body_or_particles
 from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import ShapeError
@@ -87,7 +88,13 @@ class ConjugateTime:
 
 
 def jacobi_fields(
-    body: Body | ParticleBody, metric: Any, shape: Array, rate: Array, charge: Array, duration: float, tolerance: float
+    body: Body | ParticleBody | str,
+    metric: Any,
+    shape: Array,
+    rate: Array,
+    charge: Array,
+    duration: float,
+    tolerance: float,
 ) -> JacobiFields:
     """Return all Jacobi fields that vanish at the start, along the extremal of these (trusted) arguments.
 
@@ -101,7 +108,7 @@ def jacobi_fields(
     >>> print(np.abs(fields.matrix(np.array([0.0]))).max())  # they vanish at the start
     0.0
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     duration = number_argument(duration, "duration", "s")
     tolerance = number_argument(tolerance, "tolerance")
     n, equations = body.n_shape, hamiltonian(body, metric)

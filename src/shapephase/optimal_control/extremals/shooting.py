@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import check_object, tolerance_argument
+from ...arguments import tolerance_argument
 from ...arrays import Array
 from ...body.body import Body
+from ...body.loading import as_body_or_particles
 from ...body.particles.point_masses import ParticleBody
 from ...errors import AccuracyNotReached, ShapeError
-from ...shape_space.body_path import route_along
+from ...shape_space.body_path import as_path, route_along
 from ...shape_space.connection import horizontal_lift
 from ...shape_space.shape_path import ShapePath
 from .extremal import Extremal, extremal
@@ -119,8 +120,8 @@ class _BoundaryProblem:
 
 
 def shoot(
-    body: Body | ParticleBody,
-    path: ShapePath,
+    body: Body | ParticleBody | str,
+    path: ShapePath | str,
     target: ArrayLike | None = None,
     *,
     metric: Any = "kinetic",
@@ -153,8 +154,8 @@ def shoot(
     >>> print(f"{path.cost:.4f} <= {sp.optimal_control.path_cost(cat, loop):.4f} J s")
     0.0204 <= 0.0204 J s
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
+    body = as_body_or_particles(body)
+    path = as_path(path, body)
     route = route_along(body, path)
     goal = tolerance_argument(tolerance)
     turn = horizontal_lift(body, route).end if target is None else so3.rotation_argument(target, "target")

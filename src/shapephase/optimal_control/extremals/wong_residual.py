@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from ... import so3
-from ...arguments import check_object
 from ...arrays import Array
 from ...body.body import Body
+from ...body.loading import as_body_or_particles
 from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
-from ...shape_space.body_path import route_along
+from ...shape_space.body_path import as_path, route_along
 from ...shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
 from ...shape_space.shape_path import ShapePath
 from ..symbolic import call_casadi
@@ -59,8 +59,8 @@ class WongFit:
 
 
 def wong_residual(
-    body: Body | ParticleBody,
-    path: ShapePath,
+    body: Body | ParticleBody | str,
+    path: ShapePath | str,
     *,
     metric: Any = "kinetic",
     joints: Sequence[str] | None = None,
@@ -97,8 +97,8 @@ def wong_residual(
     >>> print(f"{sp.optimal_control.wong_residual(cat, loop).residual:.3f}")  # an extremal
     0.000
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
+    body = as_body_or_particles(body)
+    path = as_path(path, body)
     route = route_along(body, path)
     equations = hamiltonian(body, metric)
     coupling = joint_coupling(body, joints, symmetric)

@@ -15,7 +15,7 @@ from ...inertia_tensor import inverse_inertia
 from ...letters import value_text
 from ...rigid_body.euler_top import EulerTop
 from ...rigid_body.poinsot import Poinsot
-from ..page import Page, frame_count, playing_speed
+from .page import Page, frame_count, playing_speed
 from .report_data import plot_data
 from .templates import SCENE_SCRIPTS, page_from
 

@@ -17,7 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from ...letters import printable
-from ..page import Page
+from .page import Page
 
 _PACKAGE = "shapephase.plots.pages"
 SCENE_SCRIPTS = ("packed", "linear", "geometry", "scene3d", "clock", "kinematics", "figure3d", "player")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from ...arrays import Array, Mask, lock_arrays
-from ...display import short_repr
+from ...arrays import Array, Mask
+from ...display import frozen
 from ..curves import PiecewisePolynomial
 from ..linear_smoother import LinearSmoother
 from ..path_samples import PathSamples, path_samples
@@ -17,7 +17,7 @@ from ..shape_geodesic import ClosingArc
 from ..shape_path import ShapePath, interpolated
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class Prepared:
     """Samples, from which turns and drift are taken off, which are smoothed, and through which a spline is put.
 
@@ -35,10 +35,6 @@ class Prepared:
     turns: Array
     drift: bool
     joint_names: tuple[str, ...] | None
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
     @property
     def smoothed(self) -> Mask:
@@ -131,7 +127,7 @@ class Prepared:
         return even
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Resampled:
     """Values of a path through samples, evenly in time, through which another spline is put.
 
@@ -141,8 +137,6 @@ class Resampled:
     inner: ShapePath
     times: Array
     count: int
-
-    __post_init__ = lock_arrays
 
     @property
     def samples(self) -> Array:

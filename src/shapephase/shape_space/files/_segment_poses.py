@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ... import so3
 from ...arrays import Array, Integers
 from ...body.body import Body
 from ...body.couplings.ball_joints import RATES, coordinate_names
-from ...display import short_repr
+from ...display import frozen
 from ...errors import TrajectoryError, TrajectoryWarning
 from ._segment_links import MOST_OFF_WAY, SHORT, Links, SegmentChoices, angle_of_ways
 from .formats.segment_poses import pose_columns
@@ -31,7 +31,7 @@ _FEWEST_LINKS = 2  # links of a rigid part with another centre of mass than the 
 _ACROSS = 1e-6  # cosine of the angle between orthogonal hinges
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class SegmentMotion:
     """Angular momentum about the centre of mass of a body whose segments were recorded, in the recorder's axes.
 
@@ -59,8 +59,6 @@ class SegmentMotion:
     of_poses: Array | None
     of_chain: Array
     record: Mapping[str, Any]
-
-    __repr__ = short_repr
 
     def within(self, first: float, last: float) -> dict[str, Any]:
         """The record with means and rms difference of the momentum between two times [s], ready for JSON."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +11,7 @@ from ... import so3
 from ...arguments import check_object
 from ...arrays import Array
 from ...body.body import Body
-from ...display import short_repr
+from ...display import frozen
 from ...errors import TrajectoryError, unknown_name
 from ..connection import horizontal_lift
 from ..curves import CLOSED
@@ -24,7 +23,7 @@ from .smoothing import Recorded, Smoothing, prepared_path
 WAYS = ("smooth", "drift", "geodesic")  # periodic smoother; gap taken off evenly in time; geodesic at the end
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Closing:
     """Loop made of a recorded cycle.
 
@@ -51,8 +50,6 @@ class Closing:
     opened: ShapePath
     closed: ShapePath
     body: Body
-
-    __repr__ = short_repr
 
     @property
     def seconds_added(self) -> float:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
 
-from ...arguments import check_object, made_by
+from ...arguments import made_by
 from ...arrays import Array
 from ...body.body import Body
-from ...display import short_repr
+from ...body.loading import as_body
+from ...display import frozen
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ..shape_path import ShapePath, without_joints
 from ._joint_columns import JointChoices, Matched, matched
@@ -33,7 +34,7 @@ _MOST_SAMPLES = 2_000_000  # of a resampled path: 16 MB for each joint
 
 
 @made_by(ShapePath="it is recorded.path")
-@dataclass(frozen=True, eq=False)
+@frozen
 class RecordedMotion:
     """Recorded joint motion and the path made of it. Made by `read_recorded_motion`.
 
@@ -71,11 +72,9 @@ class RecordedMotion:
     wheel_speeds: Mapping[str, ShapePath] = field(default_factory=dict)
     base_rates: Array | None = None
 
-    __repr__ = short_repr
-
 
 @show_options(ReadingOptions)
-def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions]) -> RecordedMotion:
+def read_recorded_motion(file: Any, body: Body | str, **options: Unpack[ReadingOptions]) -> RecordedMotion:
     """Read a recorded motion: the joints, and the base where it was recorded.
 
     The kind of file follows from its ending:
@@ -212,7 +211,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     >>> print(recorded.path.duration, recorded.residual.max())
     2.0 0.0
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     how = Reading.of(options, body)
     option, unit = how.given, how.given("time_unit")
     given, step = read_input(file, body, option("topic"), option("timestep"), option("joint_order"), how.names)
@@ -305,7 +304,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
 
 
 @show_options(ReadingOptions)
-def read_shape_path(file: Any, body: Body, **options: Unpack[ReadingOptions]) -> ShapePath:
+def read_shape_path(file: Any, body: Body | str, **options: Unpack[ReadingOptions]) -> ShapePath:
     """Read a recorded motion as a path: a C2 spline, periodic where the last sample equals the first.
 
     Kinds of file, keyword arguments and errors are those of `read_recorded_motion`.

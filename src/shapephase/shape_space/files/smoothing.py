@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_flag, positive_argument
-from ...arrays import FARTHEST, Array, Mask, finite_array, lock_arrays
+from ...arrays import FARTHEST, Array, Mask, finite_array
 from ...body.body import Body
-from ...display import short_repr
+from ...display import frozen
 from ...errors import ShapeError, TrajectoryError
 from ...letters import value_text
 from ..curves import CLOSED, PiecewisePolynomial
@@ -34,7 +34,7 @@ _EXACT = 1e-9  # relative to the samples' spread: less noise is none, and sample
 _MOST_SWING = 4.0 * FARTHEST  # [rad or m] between two samples: terms of its cubics are then right to 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Smoothing:
     """Effect of smoothing on recorded samples.
 
@@ -62,10 +62,6 @@ class Smoothing:
     in_band: Array | None = None
     noise_in_band: Array | None = None
     ends: tuple[float, float] = (0.0, 0.0)
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
     def of_joints(self, kept: Mask) -> Smoothing:
         """What it did to some of the joints, True in (n,)."""

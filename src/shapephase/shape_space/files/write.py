@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_file_name, check_object, check_text
+from ...arguments import check_file_name, check_text
 from ...arrays import Array, finite_array
 from ...errors import ShapeError, TrajectoryError, TrajectoryWarning, unknown_name
 from ...files import output_target, write_whole
 from ...provenance import provenance
+from ..body_path import as_path
 from ..path_series import spline_error
 from ..shape_path import ShapePath
 from .labels import SI, doubtful_turns
@@ -27,7 +28,7 @@ _FAR_OFF = 1e-3  # [rad or m] error of reading back a table at given times, abov
 
 
 def write_shape_path(
-    path: ShapePath, file: str | os.PathLike[str], times: ArrayLike | None = None, *, comment: str | None = None
+    path: ShapePath | str, file: str | os.PathLike[str], times: ArrayLike | None = None, *, comment: str | None = None
 ) -> None:
     """Write a joint motion as CSV, TSV or NPZ, by the file's ending; what `read_shape_path` reads.
 
@@ -60,7 +61,7 @@ def write_shape_path(
     >>> print(sp.read_shape_path("cat.csv", sp.load_body("cat")).duration)
     2.0
     """
-    check_object(path, "ShapePath", "path")
+    path = as_path(path)
     check_file_name(file, "file")
     where = Path(file)
     suffix = where.suffix.lower()

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import check_object, made_by, number_argument, whole_argument
-from ...arrays import Array, lock_arrays
+from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_smooth
+from ...body.loading import as_body_or_particles
 from ...body.particles.point_masses import ParticleBody
-from ...display import short_repr
+from ...display import frozen
 from ...errors import ShapeError
 from ..body_path import one_shape
 from ..connection import connection_slopes, curvature, horizontal_lift
@@ -30,7 +30,7 @@ _SEED = 26  # any fixed seed: repeatable results
 _LIFT_TOLERANCE = 1e-12  # [rad] of the lift that carries a curvature back
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class OrderReach:
     """Axes of the turns by loops small to some order of their stroke. Made by `reachable`.
 
@@ -47,11 +47,8 @@ class OrderReach:
     axes: Array
     singular_values: Array
 
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class PairTurn:
     """Turn of the body by a small loop of two joints. Made by `reachable`.
 
@@ -68,9 +65,6 @@ class PairTurn:
     axis: Array
     units: str
 
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
-
     @property
     def degrees(self) -> float:
         """Degrees per square radian, or per product of the joints' units."""
@@ -78,7 +72,7 @@ class PairTurn:
 
 
 @made_by("reachable(body, shape)")
-@dataclass(frozen=True, eq=False)
+@frozen
 class Reach:
     """The rotations that loops of the joints reach from a shape. Made by `reachable`.
 
@@ -108,9 +102,6 @@ class Reach:
     loops: tuple[AxisLoop, ...]
     pairs: tuple[PairTurn, ...]
 
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
-
     @property
     def gap(self) -> float:
         """The least singular value that counts over the largest that does not, or over the noise where that is more."""
@@ -127,7 +118,7 @@ class Reach:
 
 
 def reachable(
-    body: Body | ParticleBody, shape: ArrayLike | None = None, *, most_orders: int = 5, tolerance: float = 1e-8
+    body: Body | ParticleBody | str, shape: ArrayLike | None = None, *, most_orders: int = 5, tolerance: float = 1e-8
 ) -> Reach:
     """Find the rotations that loops of the joints reach from a shape, the smallest such loops, and the best joints.
 
@@ -163,7 +154,7 @@ def reachable(
     >>> found.rank, found.pairs[0].joints
     (3, ('waist_pitch', 'waist_yaw'))
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     if isinstance(body, Body):
         check_smooth(body.chain.follows, "derivatives of the curvature need")
     least = number_argument(tolerance, "tolerance")

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import check_flag, check_object, vector_argument
+from ...arguments import check_flag, vector_argument
 from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...body.link_motions import link_motions
+from ...body.loading import as_body
 from ...errors import unknown_name
 from ..connection import mechanical_connection
 
@@ -17,7 +18,7 @@ _NULL = 1e-12  # rounding of singular values, relative to the largest
 
 
 def generalised_jacobian(
-    body: Body, shape: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0), *, fixed_base: bool = False
+    body: Body | str, shape: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0), *, fixed_base: bool = False
 ) -> Array:
     """Velocity of a point of a link per joint rate, for a body without momentum that turns back meanwhile.
 
@@ -51,7 +52,7 @@ def generalised_jacobian(
     >>> matrix.shape
     (6, 10)
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     check_flag(fixed_base, "fixed_base")
     connection = mechanical_connection(body, shape)
     r = finite_array(shape, "shape")
@@ -77,7 +78,7 @@ def generalised_jacobian(
     return np.concatenate([linear, angular], axis=1).reshape(*r.shape[:-1], 6, count)
 
 
-def reaction_null_space(body: Body, shape: ArrayLike) -> Array:
+def reaction_null_space(body: Body | str, shape: ArrayLike) -> Array:
     """Joint rates that do not turn the base of a body without momentum: an orthonormal basis, (n,) -> (n, k).
 
     Those whose angular momentum J rate vanishes: k = n - 3, or more where the joints cannot turn it about every axis.
@@ -93,14 +94,18 @@ def reaction_null_space(body: Body, shape: ArrayLike) -> Array:
     >>> quiet.shape, bool(np.abs(arm.momentum_matrix(np.full(10, 0.3)) @ quiet).max() < 1e-12)
     ((10, 7), True)
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     _, values, right = np.linalg.svd(body.momentum_matrix(shape))
     rank = int(np.sum(values > _NULL * values.max(initial=0.0)))
     return np.swapaxes(right, -1, -2)[:, rank:]
 
 
 def dynamic_manipulability(
-    body: Body, shape: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0), directions: ArrayLike | None = None
+    body: Body | str,
+    shape: ArrayLike,
+    link: str,
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    directions: ArrayLike | None = None,
 ) -> Array:
     """Singular values of the generalised Jacobian, descending: 0 at a dynamic singularity, (..., n) -> (..., k).
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import check_object, whole_argument
-from ...arrays import Array, finite_array, lock_arrays
+from ...arguments import whole_argument
+from ...arrays import Array, finite_array
 from ...body.body import Body
+from ...body.loading import as_body_or_particles
 from ...body.particles.point_masses import ParticleBody
-from ...display import short_repr
+from ...display import frozen
 from ...errors import AccuracyNotReached, ShapeError
 from ..body_path import check_closed, in_joint_order, route_along
 from ..connection import integral, mechanical_connection
@@ -30,7 +30,7 @@ _SMALL_STEP = 1e-11  # [rad] of the last correction
 _TURN_TOLERANCE = 1e-12  # change of the integral of the connection's size at which halving ends
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class MinimumPerturbation:
     """A frame U(r) for each shape of a region, with the least connection. Made by `minimum_perturbation`.
 
@@ -51,9 +51,6 @@ class MinimumPerturbation:
     layers: Array
     mean_square: tuple[float, float]
 
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
-
     def frame(self, shape: ArrayLike) -> Array:
         """U, the base's vectors seen from the frame: (..., n) -> (..., 3, 3)."""
         return self._reached(shape)[0]
@@ -62,7 +59,7 @@ class MinimumPerturbation:
         """The connection in this frame, U (A_j + U^T d_j U): (..., n) -> (..., 3, n), as `mechanical_connection`."""
         return self._reached(shape)[1]
 
-    def along(self, path: ShapePath) -> Callable[[Array], tuple[Array, Array]]:
+    def along(self, path: ShapePath | str) -> Callable[[Array], tuple[Array, Array]]:
         """The frame in time, for `in_gauge`: times (N,) -> U (N, 3, 3) and its body rates (N, 3) [rad/s]."""
         route = in_joint_order(self.body, path)
 
@@ -74,7 +71,7 @@ class MinimumPerturbation:
 
         return frames
 
-    def first_order_turn(self, path: ShapePath) -> Array:
+    def first_order_turn(self, path: ShapePath | str) -> Array:
         """The turn of a loop by one integral of the connection in this frame, exp(-integral of A): -> (3, 3).
 
         Seen from the base at the start, as `holonomy`. The integral is right to 1e-12 of that of the connection's size,
@@ -114,7 +111,7 @@ class MinimumPerturbation:
 
 
 def minimum_perturbation(
-    body: Body | ParticleBody, centre: ArrayLike, width: ArrayLike, degree: int = 3
+    body: Body | ParticleBody | str, centre: ArrayLike, width: ArrayLike, degree: int = 3
 ) -> MinimumPerturbation:
     """The frame of the body, as a function of its shape, in which motions of the joints disturb it least on the whole.
 
@@ -146,7 +143,7 @@ def minimum_perturbation(
     >>> bool(least < 0.2 * base)
     True
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     count = body.n_shape
     middle = finite_array(centre, "centre").copy()
     widths = np.broadcast_to(finite_array(width, "width"), middle.shape if np.ndim(width) == 0 else np.shape(width))

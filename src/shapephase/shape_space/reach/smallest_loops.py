@@ -9,14 +9,12 @@ and a loop turns the body by the exponential of minus its integral, up to bracke
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import positive_argument
-from ...arrays import Array, Integers, lock_arrays
-from ...display import short_repr
+from ...arrays import Array, Integers
+from ...display import frozen
 from ..shape_path import ShapePath
 
 _STARTS = 24  # random directions of the climbs to the best figure of eight: each ends at a local optimum
@@ -26,7 +24,7 @@ _SMALL_PLANE = 1e-12  # rounding of a plane of a loop, relative to the largest
 _FIRST_CORRECTION = 5  # of the first correcting circle: no sum of three frequencies among 1, 2 and this vanishes
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class AxisLoop:
     """The smallest loop that turns a body about one axis, to the leading order of its stroke.
 
@@ -57,9 +55,6 @@ class AxisLoop:
     planes: Array
     frequencies: Integers
     powers: Array
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     def loop(self, stroke: float, duration: float = 1.0) -> ShapePath:
         """The loop with a stroke [1] in some time [s]; raises TrajectoryError for a size that is not above 0."""

@@ -1,0 +1,1 @@
+shapephase audit diver robots/diver_dive.mot --html audit.html

@@ -1,0 +1,2 @@
+shapephase contributions diver diver_twist \
+    --momentum 0 61.558831 0 --html shares.html

@@ -1,0 +1,5 @@
+import shapephase as sp
+
+top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.3, 0.5, 0.9])
+ax = sp.plots.column_axes(3.8)
+sp.plots.plot_herpolhode(ax, top, periods=5)

@@ -1,0 +1,1 @@
+shapephase plot inertia diver diver_twist --out inertia.png

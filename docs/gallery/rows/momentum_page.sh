@@ -1,0 +1,1 @@
+shapephase momentum diver robots/diver_dive.mot --html momentum.html

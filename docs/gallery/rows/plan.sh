@@ -1,0 +1,1 @@
+shapephase plan cat --turn "180 about x" --html plan.html

@@ -1,0 +1,1 @@
+shapephase reach cat --out reach.png

@@ -1,0 +1,1 @@
+shapephase contributions cat cat_righting --of twist --figure shares.png

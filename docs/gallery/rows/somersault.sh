@@ -1,0 +1,2 @@
+shapephase plot somersault diver diver_twist \
+    --momentum 0 61.558831 0 --out somersault.png

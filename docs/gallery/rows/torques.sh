@@ -1,0 +1,2 @@
+shapephase plot torques satellite satellite_sweep \
+    --momentum 0 0 12 --out torques.png

@@ -1,0 +1,1 @@
+shapephase view cat cat_righting --video righting.png
