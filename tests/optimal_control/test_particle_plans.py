@@ -6,10 +6,14 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import eigh
+from support.long_runs import full_but
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.errors import ShapeError, UnknownNameError, UnreachableGoalError
 from shapephase.optimal_control import (
+    Goal,
+    Limits,
     Search,
     conjugate_times,
     extremal,
@@ -17,6 +21,7 @@ from shapephase.optimal_control import (
     plan_reorientation,
     shoot,
     small_loop,
+    symbolic_body,
     wong_residual,
 )
 
