@@ -200,7 +200,7 @@ LARGEST_TURN = 28.15937237
 
 
 def pentagon(limit=None):
-    """Corners of unit mass on a closed chain of unit edges, about the regular one; without a limit in a chart of a disc."""
+    """Corners of unit mass on a closed chain of unit edges, in a chart of a disc if there is no limit."""
     k = np.arange(5)
     free, rest = ca.SX.sym("free", 2), ca.SX.sym("rest", 2)
     slow, fast = (ca.DM(np.stack([np.cos(f * k), np.sin(f * k)], axis=1)) for f in (0.4 * np.pi, 0.8 * np.pi))
