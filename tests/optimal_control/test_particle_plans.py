@@ -216,7 +216,7 @@ def pentagon(limit=None):
     corners, chart = ca.substitute(ca.cumsum(edges), rest, closing), ca.SX.sym("chart", 2)
     shape = chart if limit else 1.1 * chart / ca.sqrt(1.0 + ca.sumsqr(chart))
     places = ca.Function("corners", [chart], [ca.substitute(corners, free, shape)])
-    limits = dict.fromkeys(("free_1", "free_2"), (-limit, limit)) if limit else None
+    limits = dict.fromkeys(["free_1", "free_2"], (-limit, limit)) if limit else None
     return sp.particle_body(np.ones(5), places, ["free_1", "free_2"], limits=limits)
 
 
