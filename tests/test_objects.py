@@ -29,7 +29,8 @@ MOMENTUM = (0.01, 0.02, 0.03)
 # Functions that other functions of the library call with what they have checked.
 INNER = ("deformation.frames", "shape_space.body_path", "plots.plot_style", "optimal_control.task",
          "optimal_control.guesses.loops", "shape_space.shape_path.without_joints",
-         "optimal_control.symbolic", "body.drawing", "examples.slow_deformation.first_loop",
+         "optimal_control.symbolic", "optimal_control.cost_metric", "optimal_control.nodes",
+         "body.drawing", "examples.slow_deformation.first_loop",
          "shape_space.connection.connection_slopes", "shape_space.shape_geodesic.ClosingArc", "plots.pages",
          "shape_space.path_samples", "shape_space.path_series", "shape_space.files.formats", "phases.split_text",
          "phases.momentum_curve", "body.engines", "shape_space.files.flight",

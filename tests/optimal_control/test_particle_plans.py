@@ -6,10 +6,14 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import eigh
+from scipy.optimize import brentq
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.errors import ShapeError, UnknownNameError, UnreachableGoalError
 from shapephase.optimal_control import (
+    Goal,
+    Limits,
     Search,
     conjugate_times,
     extremal,
@@ -17,8 +21,10 @@ from shapephase.optimal_control import (
     plan_reorientation,
     shoot,
     small_loop,
+    symbolic_body,
     wong_residual,
 )
+from support.long_runs import full_but
 
 EPS = np.finfo(float).eps
 Z = np.array([0.0, 0.0, 1.0])
@@ -47,18 +53,22 @@ def triangle(chart):
 
 
 def random_parts(seed):
-    """Masses, places at rest, and what two parameters and their sines move of them; even seeds are planar."""
-    rng = np.random.default_rng(seed)
-    parts = np.concatenate([[BEFORE], rng.normal(size=(4, 6, 3)) * np.array([0.3, 0.3, 0.2, 0.2])[:, None, None]])
-    return rng.uniform(0.5, 2.0, 6), parts * ([1.0, 1.0, 0.0] if seed % 2 == 0 else [1.0, 1.0, 1.0])
+    """Masses, places at rest, and what parameters and sines of the first two move; even seeds are planar."""
+    rng, flat = np.random.default_rng(seed), seed % 2 == 0
+    sizes = np.array([0.3, 0.3, 0.2, 0.2] if flat else [0.3, 0.3, 0.3, 0.2, 0.2])
+    parts = np.concatenate([[BEFORE], rng.normal(size=(len(sizes), 6, 3)) * sizes[:, None, None]])
+    return rng.uniform(0.5, 2.0, 6), parts * ([1.0, 1.0, 0.0] if flat else [1.0, 1.0, 1.0])
+
+
+def random_places(r, parts):
+    factors = [1.0, *ca.vertsplit(r), ca.sin(2.0 * r[1]), ca.sin(2.0 * r[0] + 1.0)]
+    return sum(factor * ca.DM(part) for factor, part in zip(factors, parts, strict=True))
 
 
 def random_body(seed):
     masses, parts = random_parts(seed)
-    r = ca.SX.sym("r", 2)
-    factors = [1.0, r[0], r[1], ca.sin(2.0 * r[1]), ca.sin(2.0 * r[0] + 1.0)]
-    places = sum(factor * ca.DM(part) for factor, part in zip(factors, parts, strict=True))
-    return sp.particle_body(masses, ca.Function("places", [r], [places]), ["a", "b"])
+    r = ca.SX.sym("r", len(parts) - 3)
+    return sp.particle_body(masses, ca.Function("places", [r], [random_places(r, parts)]), list("abc")[: r.shape[0]])
 
 
 class Sines:
@@ -185,14 +195,172 @@ def test_small_loops_are_ellipses_in_a_metric_of_unequal_axes():
 # --- the pentagon -------------------------------------------------------------------------------------------
 
 
-def pentagon():
-    """Corners of unit mass on a closed chain of unit edges, about the regular one."""
+LARGEST_TURN = 28.15937237
+"""[degrees] of a loop of pentagons with unit edges. Tong and Dullin, SIAM J. Applied Dynamical Systems 11 (2012)."""
+
+
+def pentagon(limit=None):
+    """Corners of unit mass on a closed chain of unit edges, in a chart of a disc if there is no limit."""
     k = np.arange(5)
-    free, rest = ca.MX.sym("free", 2), ca.MX.sym("rest", 2)
+    free, rest = ca.SX.sym("free", 2), ca.SX.sym("rest", 2)
     slow, fast = (ca.DM(np.stack([np.cos(f * k), np.sin(f * k)], axis=1)) for f in (0.4 * np.pi, 0.8 * np.pi))
     headings = 0.4 * np.pi * k + fast @ free + slow @ rest
     edges = ca.horzcat(ca.cos(headings), ca.sin(headings))
-    closing = ca.rootfinder("closing", "newton", ca.Function("gap", [rest, free], [ca.sum1(edges).T]))
-    corners = ca.cumsum(ca.substitute(edges, rest, closing(np.zeros(2), free)))
-    limits = {"free_1": (-1.2, 1.2), "free_2": (-1.2, 1.2)}
-    return sp.particle_body(np.ones(5), ca.Function("corners", [free], [corners]), ["free_1", "free_2"], limits=limits)
+    gap = ca.sum1(edges).T
+    nearer, closing = (
+        ca.Function("nearer", [rest, free], [rest - ca.solve(ca.jacobian(gap, rest), gap)]),
+        ca.SX.zeros(2),
+    )
+    for _ in range(6):
+        closing = nearer(closing, free)
+    corners, chart = ca.substitute(ca.cumsum(edges), rest, closing), ca.SX.sym("chart", 2)
+    shape = chart if limit else 1.1 * chart / ca.sqrt(1.0 + ca.sumsqr(chart))
+    places = ca.Function("corners", [chart], [ca.substitute(corners, free, shape)])
+    limits = dict.fromkeys(["free_1", "free_2"], (-limit, limit)) if limit else None
+    return sp.particle_body(np.ones(5), places, ["free_1", "free_2"], limits=limits)
+
+
+@pytest.mark.full
+def test_charges_of_the_pentagon_lead_to_its_largest_turn():
+    """Near the loop of zero curvature the turn lacks a square of the distance, which is one over the charge."""
+    body, turns, charges = pentagon(), np.array([27.0, 28.0, 28.1]), []
+    start = np.array([brentq(lambda size: sp.curvature(body, [size, 0.0])[0, 1, 2], 0.6, 2.5), 0.0])
+    around = 2.0 * np.pi * np.linspace(0.0, 1.0, 41)
+    path = sp.ShapePath.spline(around / (2.0 * np.pi), start[0] * np.stack([np.cos(around), np.sin(around)], axis=1))
+    for turn in np.radians(turns):
+        search = Search(pieces=40, guess=path)
+        plan = plan_reorientation(body, so3.exp(turn * Z), start=start, rates_at_ends="free", search=search)
+        assert plan.goal_error < 1e-9
+        path = plan.path
+        charges.append(wong_residual(body, path).charge[2])
+    assert (np.diff(charges) > 0.0).all()
+    charges = np.array(charges)
+    largest = np.linalg.solve(np.stack([np.ones(3), -(charges**-2), -(charges**-3)], axis=1), turns)[0]
+    # The next term of the series is seen at 27 degrees.
+    assert abs(largest - LARGEST_TURN) < 5e-3
+
+
+# --- a transcription of another kind ------------------------------------------------------------------------
+
+
+def spectral_optimum(masses, parts, goal, plan):
+    """Least cost of a loop by collocation of rates and attitudes in eight panels of twelve Gauss nodes, by IPOPT.
+
+    Mechanics from the positions: the angular momentum of the particles is zero, and the cost their kinetic energy. The
+    search starts from a plan, so that it comes to the same of several optima.
+    """
+    n, flat, panels, stages = len(parts) - 3, not parts[:, :, 2].any(), 8, 12
+    nodes, weights = np.polynomial.legendre.leggauss(stages)
+    times = ((np.arange(panels)[:, None] + 0.5 * (nodes + 1.0)) / panels).ravel()
+    weights = np.tile(0.5 * weights / panels, panels)
+    # Integrals from the start of a panel to its nodes, of the polynomial through values at the nodes.
+    series = np.polynomial.legendre.legint(np.eye(stages), lbnd=-1.0)
+    inside = np.polynomial.legendre.legval(nodes, series).T
+    inside = inside @ np.linalg.inv(np.polynomial.legendre.legvander(nodes, stages - 1)) * 0.5 / panels
+    within = ca.kron(ca.DM.eye(panels), ca.DM(inside.T))
+    onward = ca.kron(ca.DM.eye(panels), ca.DM(weights[:stages]))
+    from_begin = ca.kron(ca.DM.eye(panels), ca.DM.ones(1, stages))
+    r, u, q = (ca.SX.sym(*what) for what in (("r", n), ("u", n), ("q", 4)))
+    places = random_places(r, parts)
+    places = places - ca.repmat(ca.DM(masses / masses.sum()).T @ places, 6, 1)
+    moving = ca.reshape(ca.jtimes(places, r, u), 6, 3)
+    at, going = ([part[k, :].T for k in range(6)] for part in (places, moving))
+    inertia = sum(m * (ca.dot(x, x) * ca.SX.eye(3) - x @ x.T) for m, x in zip(masses, at, strict=True))
+    omega = -ca.inv(inertia) @ sum(m * ca.cross(x, v) for m, x, v in zip(masses, at, going, strict=True))
+    energy = 0.5 * sum(m * ca.sumsqr(v + ca.cross(omega, x)) for m, x, v in zip(masses, at, going, strict=True))
+    turning = 0.5 * ca.vertcat(q[3] * omega + ca.cross(q[:3], omega), -ca.dot(q[:3], omega))
+    count, one = len(times), ca.DM([0.0, 0.0, 0.0, 1.0])
+    node = ca.Function("node", [r, u, q], [turning, energy]).map(count)
+    rates, states = ca.MX.sym("rates", n, count), ca.MX.sym("states", n + 4, count)
+    begins = ca.MX.sym("begins", n + 4, panels + 1)
+    turned, energies = node(states[:n, :], rates, states[n:, :])
+    flow = ca.vertcat(rates, turned)
+    x, y, z, w = so3.quat_from_matrix(goal)
+    missing = ca.DM([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]]) @ begins[n:, -1]
+    rows = [
+        states - begins[:, :-1] @ from_begin - flow @ within,
+        begins[:, 1:] - begins[:, :-1] - flow @ onward,
+        begins[:, 0] - ca.vertcat(ca.DM(plan.path.shape(0.0)), one),
+        begins[:n, -1] - ca.DM(plan.path.shape(0.0)),
+        missing[2] if flat else missing,
+    ]
+    rows = ca.vertcat(*(ca.vec(row) for row in rows))
+    unknown = ca.vertcat(ca.vec(rates), ca.vec(states), ca.vec(begins))
+
+    def known(at):
+        turns = so3.quat_from_matrix(plan.motion.attitude(at))
+        return np.concatenate([plan.path.shape(at), turns * np.where(turns[:, 3:] < 0.0, -1.0, 1.0)], axis=1)
+
+    guess = [plan.path.rate(times), known(times), known(np.linspace(0.0, 1.0, panels + 1))]
+    options = {"ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-10}, "print_time": False}
+    solver = ca.nlpsol("loop", "ipopt", {"x": unknown, "f": ca.dot(energies.T, weights), "g": rows}, options)
+    result = solver(x0=np.concatenate([part.ravel() for part in guess]), lbg=0.0, ubg=0.0)
+    assert solver.stats()["return_status"] == "Solve_Succeeded"
+    return float(result["f"])
+
+
+@pytest.mark.parametrize("seed", full_but(range(10), 8))
+def test_plans_of_random_bodies_cost_what_another_transcription_finds(seed):
+    rng = np.random.default_rng(100 + seed)
+    body, (masses, parts) = random_body(seed), random_parts(seed)
+    goal = so3.exp(0.15 * Z if seed % 2 == 0 else 0.05 * (so3.normalised(rng.normal(size=3))))
+    plan = plan_reorientation(body, goal, rates_at_ends="free", search=Search(pieces=80))
+    assert plan.goal_error < 1e-9
+    np.testing.assert_allclose(plan.cost, spectral_optimum(masses, parts, goal, plan), rtol=1e-6)
+    again = sp.reconstruct(sp.articulated(body, plan.path), 0.0 * Z, tolerance=1e-11).final_attitude
+    assert so3.angle(goal.T @ again) < 1e-9
+
+
+def test_places_by_a_function_of_python_give_the_same_mechanics():
+    places = Sines(0)
+    given = sp.particle_body(places.masses, places, ["a", "b"])
+    shape = np.array([0.2, -0.3])
+    for name in ("inertia", "momentum_matrix", "shape_metric"):
+        found, known = (np.array(getattr(symbolic_body(body), name)(shape)) for body in (given, random_body(0)))
+        np.testing.assert_allclose(found, known, rtol=0, atol=50 * EPS)
+
+
+@pytest.mark.full
+def test_a_plan_by_a_function_of_python_is_that_of_the_function_of_casadi():
+    """Second and third derivatives are differences there; the optimum depends on the first alone."""
+    places, goal = Sines(0), so3.exp(0.15 * Z)
+    given, search = sp.particle_body(places.masses, places, ["a", "b"]), Search(pieces=12, iterations=60)
+    costs = [
+        plan_reorientation(body, goal, rates_at_ends="free", search=search).cost for body in (given, random_body(0))
+    ]
+    np.testing.assert_allclose(*costs, rtol=1e-9)
+
+
+# --- what is refused ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("goal", "options", "error", "match"),
+    [
+        (so3.exp(0.3 * np.array([1.0, 0.0, 0.0])), {}, UnreachableGoalError, r"about one axis alone, \[0, 0, 1\]"),
+        (Goal(pointing=(Z, Z), link="arm"), {}, ShapeError, "has no links"),
+        (so3.exp(0.3 * Z), {"cost": "effort"}, ShapeError, "has no motors"),
+        (so3.exp(0.3 * Z), {"limits": Limits(effort_limits=1.0)}, ShapeError, "has no motors"),
+        (so3.exp(0.3 * Z), {"limits": Limits(clearance=0.1)}, ShapeError, "has no solids"),
+        (so3.exp(0.3 * Z), {"cost": np.diag([1.0, -1.0])}, ShapeError, "positive definite"),
+        (so3.exp(0.3 * Z), {"cost": np.eye(3)}, ShapeError, r"2, 2\)"),
+        (so3.exp(0.3 * Z), {"cost": ca.Function("g", [ca.SX.sym("r", 2)], [1.0])}, ShapeError, "casadi.Function"),
+        (so3.exp(0.3 * Z), {"cost": "metric"}, UnknownNameError, "kinetic"),
+        (so3.exp(0.3 * Z), {"start": [2.0, 0.0]}, sp.errors.TrajectoryError, "free_1"),
+    ],
+)
+def test_what_particles_cannot_do_is_refused(goal, options, error, match):
+    body = pentagon(1.2) if "start" in options else triangle("equal-area")
+    with pytest.raises(error, match=match):
+        plan_reorientation(body, goal, **options)
+
+
+def test_loops_that_do_not_turn_are_refused():
+    with pytest.raises(ShapeError, match="no small loop"):
+        small_loop(triangle("equal-area"), [0.0, 0.0], [1.0, 0.0, 0.0])
+    with pytest.raises(ShapeError, match="axis"):
+        small_loop(triangle("equal-area"), [0.0, 0.0], [0.0, 0.0, 0.0])
+    with pytest.raises(ShapeError, match="limits"):
+        sp.particle_body([1, 1, 1], Sines(0), ["a", "b"], limits={"a": (1.0, -1.0)})
+    with pytest.raises(UnknownNameError, match="parameter"):
+        sp.particle_body([1, 1, 1], Sines(0), ["a", "b"], limits={"c": (-1.0, 1.0)})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +31,7 @@ _PLACES = 1001  # on a curve of attitudes, which are close up to a length of
 _LONGEST = 60.0  # strokes
 _MOST_PLACES = 100_000
 _BETWEEN = 1.5  # factor by which a slope may exceed its sampled maximum
-_RADIUS = np.pi  # [strokes] about the start, where shapes are drawn if limits are wider
+_RADII = (np.pi, np.pi / 8.0, np.pi / 64.0)  # [strokes] about the start, where shapes are drawn if limits are wider
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,8 +337,15 @@ def _with_angles(task: Reorientation, moves: Integers, plane: _ReachableTurns) -
 
 
 def _drawn(task: Reorientation) -> Array:
-    """Coordinates drawn within the limits (N, m)."""
-    return np.random.default_rng(_SEED).uniform(*task.reach(_RADIUS * _strokes(task)), (_SHAPES, task.dimension))
+    """Coordinates drawn within the limits (N, m); nearer to the start where particles have no places farther away."""
+    strokes, coordinates = _strokes(task), np.zeros((0, task.dimension))
+    for radius in _RADII:
+        rng = np.random.default_rng(_SEED)
+        coordinates = rng.uniform(*task.reach(radius * strokes), (_SHAPES, task.dimension))
+        with suppress(ShapeError):
+            task.body.locked_inertia(task.shapes(coordinates))
+            break
+    return coordinates
 
 
 def _is_analytic(body: Body | ParticleBody) -> bool:

@@ -241,8 +241,14 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonito
         basis = SplineBasis(int(search.pieces or pieces))
         guess = None if search.guess is None else guess_of_path(task, basis, search.guess)
         first.extend([] if guess is None else [(task, basis, guess)])
-        for jobs, starts in zip((first, spare), _starting_points(task, basis, search, monitor), strict=True):
-            jobs.extend((task, basis, guess) for guess in starts)
+        try:
+            found = _starting_points(task, basis, search, monitor)
+        except PlanNotFound:  # the user's own guess is enough
+            if guess is None:
+                raise
+            continue
+        for jobs, starts in zip((first, spare), found, strict=True):
+            jobs.extend((task, basis, start) for start in starts)
     return first, spare
 
 

@@ -100,6 +100,7 @@ def small_loop(
     >>> cat = sp.load_body("cat_two_halves")
     >>> loop = sp.optimal_control.small_loop(cat, np.zeros(3), [1.0, 0.0, 0.0])
     >>> print(f"{loop.cost(np.radians(1.0)):.6f} J s")
+    0.000313 J s
     """
     check_object(body, "Body", "body", or_kind="ParticleBody")
     centre, direction = vector_argument(shape, "shape", body.n_shape), vector_argument(axis, "axis", 3)

@@ -36,7 +36,7 @@ def as_path(value: ShapePath | str, body: Body | ParticleBody | None = None, nam
     Raises like it, and WrongObjectError.
     """
     if isinstance(value, str):
-        return offered("ShapePath.by_name")(value, body)
+        return offered("named_motion")(value, body)
     check_object(value, "ShapePath", name)
     return value
 

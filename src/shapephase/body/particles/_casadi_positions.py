@@ -53,6 +53,7 @@ class CasadiPositions:
         n, m = self._sizes
         return self._evaluated(2, rows).reshape(-1, m, 3, n, n).transpose(0, 3, 4, 1, 2)
 
+    @cached_property
     def symbolic(self) -> Any:
         """Function of one shape (n) that gives places (m, 3), in scalar operations where CasADi has them."""
         import casadi
@@ -72,7 +73,7 @@ class CasadiPositions:
         """Places, first and second derivatives: each a function of (n) that gives a row in the order of C."""
         import casadi
 
-        places = self.symbolic()
+        places = self.symbolic
         shape = symbol_kind(places).sym("shape", self._sizes[0])
         entries = casadi.vec(places(shape).T)
         functions = [casadi.Function("places", [shape], [casadi.densify(entries)])]
@@ -125,7 +126,7 @@ def derivatives_function(derivatives: Callable[[int, Array], Array], n_shape: in
 
     derivatives : order k and a shape (1, n) -> derivatives of the numbers, (n, ..., n, size)
 
-    The result has to be kept as long as functions made from it: CasADi does not keep it alive.
+    The result has to be kept as long as functions made from it, which do not keep it.
     """
     import casadi
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,11 @@ class GivenPositions:
         """Second derivatives, by differences: (N, n) -> (N, n, n, m, 3)."""
         return self._differences(rows, lambda at: self._returned(at)[1])
 
+    def __getstate__(self) -> dict[str, Any]:
+        """State for pickle, without functions of CasADi, which are made anew."""
+        return {"function": self.function, "n_shape": self.n_shape, "particles": self.particles}
+
+    @cached_property
     def symbolic(self) -> Any:
         """Function of CasADi of one shape (n) that gives the entries of the places, row by row: (3 m, 1)."""
 

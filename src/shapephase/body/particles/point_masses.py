@@ -104,11 +104,10 @@ class ParticleBody(ShapeArguments):
     def maps(self) -> Any:
         """Return I (3, 3), J (3, n), the mass matrix (n, n) and the centre of mass (3,) as functions of one shape (n,).
 
-        One `casadi.Function`; the mass matrix is that of a frame at rest, about the centre of mass.
-        Derivatives of places from a Python function are the given ones and their differences. The function has to be
-        kept as long as others that are made from it.
+        One `casadi.Function`, to be used while the body exists; the mass matrix is that of a frame at rest, about the
+        centre of mass. Higher derivatives of places from a Python function are differences of the given ones.
         """
-        return particle_maps(self.places.symbolic(), self.masses)
+        return particle_maps(self.places.symbolic, self.masses)
 
     def positions(self, shape: ArrayLike) -> Array:
         """Places of the particles from their centre of mass: (..., n) -> (..., m, 3) [m]."""

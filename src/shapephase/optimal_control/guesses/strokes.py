@@ -9,6 +9,7 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array
+from ...errors import ShapeError
 from ...shape_space.connection import connection_slopes, curvature, mechanical_connection
 from ..task import FARTHEST, Reorientation
 from .loops import ridged, start_metric
@@ -94,8 +95,11 @@ def most_of_a_loop(task: Reorientation) -> float:
     first, second = (low + shares * (high - low) for low, high in reach)
     coordinates = np.tile(task.start, (_CELLS**2, 1))
     coordinates[:, moves] = np.stack(np.meshgrid(first, second), axis=-1).reshape(-1, 2)
-    columns = task.coupling[:, moves]
-    curvatures = np.einsum("kija,i,j->ka", curvature(task.body, task.shapes(coordinates)), *columns.T)
+    try:
+        field = curvature(task.body, task.shapes(coordinates))
+    except ShapeError:
+        return np.inf  # places that a user's function does not have everywhere within the limits
+    curvatures = np.einsum("kija,i,j->ka", field, *task.coupling[:, moves].T)
     area = float(np.prod(reach[:, 1] - reach[:, 0]))
     return float(np.linalg.norm(curvatures, axis=1).mean() * area)
 
