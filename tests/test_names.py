@@ -92,11 +92,10 @@ LONG = ("shapephase.plan_reorientation", "shapephase.plots.explore", "shapephase
         "shapephase.auditing.audit_page")  # fmt: skip
 # Their examples call them without a body and a path.
 BY_HAND = ("shapephase.MinimumPerturbation.along", "shapephase.MinimumPerturbation.first_order_turn",
-           "shapephase.ShapePath.then", "shapephase.plots.write_figure",
+           "shapephase.ShapePath.circle", "shapephase.ShapePath.then", "shapephase.plots.write_figure",
            "shapephase.examples.named_motion")  # fmt: skip
 QUICK = ("shapephase.articulated", "shapephase.holonomy", "shapephase.curvature", "shapephase.reachable",
- "shapephase.path_summary", "shapephase.write_shape_path",
-         "shapephase.plots.plot_shape_path", "shapephase.optimal_control.path_cost", "shapephase.audit")  # fmt: skip
+         "shapephase.path_summary", "shapephase.write_shape_path", "shapephase.plots.plot_shape_path", "shapephase.optimal_control.path_cost", "shapephase.audit")  # fmt: skip
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -114,6 +113,9 @@ def test_a_name_gives_what_its_object_gives(place, monkeypatch, tmp_path):
 
 
 def test_what_examples_call_without_a_body_or_a_path_takes_names_too(tmp_path):
+    joints = ("waist_pitch", "waist_yaw", 0.5)
+    circles = [sp.ShapePath.circle(cat, *joints).shape(0.3) for cat in ("cat", sp.load_body("cat"))]
+    assert np.array_equal(*circles)
     path = sp.examples.MOTIONS["kane_scher"].path()
     frame = sp.minimum_perturbation("cat_two_halves", np.zeros(3), 0.3, 2)
     assert np.array_equal(frame.first_order_turn("kane_scher"), frame.first_order_turn(path))

@@ -125,7 +125,7 @@ def load_body(
     return body
 
 
-def as_body(value: Body | str | None) -> Body:
+def as_body(value: Any) -> Body:
     """Return a body that a user gave, itself or by what `load_body` takes. Raises like it, and WrongObjectError."""
     if isinstance(value, str):
         return load_body(value)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, number_argument, positive_argument, vector_argument
+from ..arguments import number_argument, positive_argument, vector_argument
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
+from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
 from ..display import short_repr
 from ..errors import ShapeError
@@ -69,7 +70,11 @@ class SmallLoop:
 
 
 def small_loop(
-    body: Body | ParticleBody, shape: ArrayLike, axis: ArrayLike = (0.0, 0.0, 1.0), *, metric: Any = "kinetic"
+    body: Body | ParticleBody | str,
+    shape: ArrayLike,
+    axis: ArrayLike = (0.0, 0.0, 1.0),
+    *,
+    metric: Any = "kinetic",
 ) -> SmallLoop:
     """Return the small loop about a shape that turns a body most about an axis for its length.
 
@@ -102,7 +107,7 @@ def small_loop(
     >>> print(f"{loop.cost(np.radians(1.0)):.6f} J s")
     0.000313 J s
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     centre, direction = vector_argument(shape, "shape", body.n_shape), vector_argument(axis, "axis", 3)
     if not direction.any():
         raise ShapeError("axis: a vector (3,) that is not zero is needed, got zeros")

@@ -177,9 +177,10 @@ class _Result(NamedTuple):
 
 
 def _planned(plan: Plan) -> _Result:
+    from ...body.loading import as_body
     from ..texts.plan_text import plan_comment, plan_data, plan_lines, plan_purpose
 
-    body, code = plan.body, _CODES[plan.status]
+    body, code = as_body(plan.body), _CODES[plan.status]
     lines, comment = plan_lines(body, plan), plan_comment(body, plan)
     return _Result(plan.motion, plan.path, lines, plan_data(body, plan), plan_purpose(plan), comment, code)
 
