@@ -95,7 +95,8 @@ BY_HAND = ("shapephase.MinimumPerturbation.along", "shapephase.MinimumPerturbati
            "shapephase.ShapePath.circle", "shapephase.ShapePath.then", "shapephase.plots.write_figure",
            "shapephase.examples.named_motion")  # fmt: skip
 QUICK = ("shapephase.articulated", "shapephase.holonomy", "shapephase.curvature", "shapephase.reachable",
-         "shapephase.path_summary", "shapephase.write_shape_path", "shapephase.plots.plot_shape_path", "shapephase.optimal_control.path_cost", "shapephase.audit")  # fmt: skip
+         "shapephase.path_summary", "shapephase.write_shape_path",
+         "shapephase.plots.plot_shape_path", "shapephase.optimal_control.path_cost", "shapephase.audit")  # fmt: skip
 
 
 @pytest.mark.filterwarnings("ignore")
