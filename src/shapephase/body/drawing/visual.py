@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from ...arguments import number_argument
 from ...arrays import Array, Integers
-from ...display import frozen
+from ...display import short_repr
 from ...inertia_tensor import principal_axes, second_moment
 from ..body import MovingPart
 
@@ -23,7 +23,7 @@ _WATER = 1000.0  # density of the ball that stands for a point mass [kg/m^3]
 _CORNERS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
 
 
-@frozen
+@dataclass(frozen=True, eq=False)
 class Visual:
     """One shape to draw.
 
