@@ -3,9 +3,10 @@
 The folders are the rooms of the theory, from the bottom up: `body` (a model and its inertia), `integrator` and
 `rigid_body` (rotations, in general and in closed form), `shape_space` (paths, connection, holonomy), `deformation`
 (inertia and internal momentum in time), `reconstruction` (the attitude), `dynamics` (what drives it), `phases`,
-`bounds`, `optimal_control` and `inverse_design`, `segments` (the part of every limb), `plots` and `examples`, `study`
-(many cases), `auditing` (is a simulated or recorded trajectory right?). `dir()` lists the rooms and the names that most
-scripts use; every public name of a room is an attribute of that room. Names are loaded when they are first used.
+`bounds`, `optimal_control` and `inverse_design` (`design`), `segments` (the part of every limb), `plots` and
+`examples`, `study` (many cases), `auditing` (is a simulated or recorded trajectory right?). `dir()` lists the rooms and
+the names that most scripts use; every public name of a room is an attribute of that room. Names are loaded when they
+are first used.
 """
 
 from difflib import get_close_matches
@@ -20,7 +21,7 @@ __version__ = "0.1.0"
 _loaded, _, __all__ = attach_stub(__name__, __file__)
 
 _SHOWN = """
-auditing body bounds deformation dynamics error_bars errors examples exports inverse_design optimal_control phases plots
+auditing body bounds deformation dynamics error_bars errors examples exports optimal_control phases plots
 reconstruction rigid_body segments shape_space so3 study
 EulerTop InertiaErrors ShapePath articulated audit contributions curvature design export_motion holonomy in_gauge
 joint_torques

@@ -55,7 +55,7 @@ from .errors import (
 )
 from .exports.tables import export_motion
 from .integrator.machine_code import compile_steps
-from .inverse_design.design import Design, design
+from .inverse_design.designing import Design, design
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
 from .phases.forced_split import ForcedSplit

@@ -1,4 +1,4 @@
 from ._family_cover import Cover
-from .design import Design, design
+from .designing import Design, design
 
 __all__ = ["Cover", "Design", "design"]

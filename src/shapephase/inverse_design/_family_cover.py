@@ -21,7 +21,6 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ..arrays import Array, lock_arrays
-from ..bounds._enclosure import ROUND_UP
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..inertia_tensor import inverse_inertia
@@ -29,6 +28,7 @@ from ..inertia_tensor import inverse_inertia
 _COUNTS = {1: 65, 2: 17, 3: 7}  # of members along each parameter, by the number of parameters
 PANELS, _TIMES = 128, 4  # panels of time after the start, which is one by itself, and times in each
 _WIDER = 1.1  # than the largest difference among those of neighbours beside it: curvature at the ends of the box
+_ROUND_UP = 1.0 + 1e-12  # for products of positive bounds: thousands of times their rounding
 _GROWTH = 1.1  # the growth of errors is measured between 17 times, to 4 %
 _FARTHEST = 0.1  # [rad] for which the three constants below hold
 _SQUARE_SPREAD, _SQUARE_DRIFT, _PRODUCT = 1.57, 1.04, 2.62  # a, b and c: commutators, and exp's inverse derivative
@@ -129,7 +129,7 @@ class FamilySamples:
         spread = _WIDER * (values[..., 2] - values[..., 0]).max(axis=-1)
         stray = _WIDER * np.linalg.norm(still, axis=-1).max(axis=-1)
         change, bent, strayed, lifted = (
-            float(rate[1 : 1 + panels].sum()) / PANELS * ROUND_UP
+            float(rate[1 : 1 + panels].sum()) / PANELS * _ROUND_UP
             for rate in (inverse * magnitude + drift, spread * centre.duration * magnitude, stray, drift)
         )
         distance = _smaller_root(_GROWTH * growth, change, _SQUARE_SPREAD * bent + _SQUARE_DRIFT * strayed)
@@ -167,5 +167,5 @@ def _smaller_root(growth: float, change: float, square: float) -> float | None:
     discriminant = linear * abs(linear) - 4.0 * growth * growth * change * square
     if discriminant <= 0.0:
         return None
-    root = 2.0 * growth * change / (linear + np.sqrt(discriminant)) * ROUND_UP
+    root = 2.0 * growth * change / (linear + np.sqrt(discriminant)) * _ROUND_UP
     return float(root) if root <= _FARTHEST else None

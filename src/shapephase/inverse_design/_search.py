@@ -100,6 +100,7 @@ class Search:
         self._tolerance, self._most = tolerance, most
         self._magnitude = float(np.linalg.norm(state[0]))
         self._deformations: dict[bytes, Deformation] = {}
+        self._margins: dict[bytes, float] = {}
         self.members: dict[bytes, Member] = {}
 
     @property
@@ -129,7 +130,7 @@ class Search:
         low, high = self._box.T
         starts = [self._member(first), *(self._member(low + share * (high - low)) for share in _shares(len(low)))]
         if self._goals.names == ["regime"]:
-            best = self._widest(max(starts, key=lambda member: member.margin))
+            best = self._widest(max(starts, key=self._certain_margin))
             return best if self.meets(best) else None
         others = sorted(starts[1:], key=lambda member: float(np.linalg.norm(member.residual)))
         ends = (self._newton(member) for member in [starts[0], *others[:_NEWTON_STARTS]])
@@ -211,11 +212,14 @@ class Search:
         return here if here.miss <= self._tolerance else None
 
     def _widest(self, start: Member) -> Member:
-        """Member with a greater margin of the regime, near another."""
+        """Member near another whose regime is certain by a greater margin.
+
+        The margins of motions alone tell too little: many members have that of the start.
+        """
         low, high = self._box.T
 
         def narrowness(share: Array) -> float:
-            return -self._member(np.clip(low + share * (high - low), low, high)).margin
+            return -self._certain_margin(self._member(np.clip(low + share * (high - low), low, high)))
 
         minimize(
             narrowness,
@@ -224,7 +228,16 @@ class Search:
             bounds=[(0.0, 1.0)] * len(low),
             options={"maxfev": _MARGIN_TRIALS, "xatol": 1e-6, "fatol": 1e-12 * (1.0 + abs(start.margin))},
         )
-        return max(self.members.values(), key=lambda member: member.margin)
+        return max(self.members.values(), key=self._certain_margin)
+
+    def _certain_margin(self, member: Member) -> float:
+        """Margin by which a certificate has the wanted regime [J]; negative where it has not."""
+        key = member.x.tobytes()
+        if key not in self._margins:
+            found = regime_certificate(member.motion.deformation, *self._state)
+            other = found.certain and found.regime != self._goals.regime
+            self._margins[key] = -found.margin if other else found.margin
+        return self._margins[key]
 
     def _deformation(self, x: Array) -> Deformation:
         """The member at x. Raises WrongObjectError for another object."""

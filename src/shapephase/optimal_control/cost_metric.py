@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import check_choice
 from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..body.particles._casadi_positions import is_casadi_function
+from ..body.particles.casadi_positions import is_casadi_function
 from ..body.particles.point_masses import ParticleBody
 from ..display import short_repr
 from ..errors import ShapeError

@@ -17,7 +17,7 @@ from ..body.couplings.coordinate_map import CoordinateMap
 from ..body.couplings.functions import JointFunction
 from ..body.joint_chain import JointChain
 from ..body.loading import as_body_or_particles
-from ..body.particles._casadi_positions import symbol_kind
+from ..body.particles.casadi_positions import symbol_kind
 from ..body.particles.point_masses import ParticleBody
 from ..display import short_repr
 from ..errors import unknown_name

@@ -141,7 +141,7 @@ def plot_elliptic_cylinders(ax: Axes, top: EulerTop, *, view: tuple[float, float
     >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
     >>> ax = sp.plots.plot_elliptic_cylinders(sp.plots.column_axes(3.9), top)
     >>> ax.get_legend().get_texts()[0].get_text()
-    'K = 0.1658 J'
+    'K = 0.1875 J'
     """
     check_axes(ax)
     pendulum, start = _pendulum_of(top)

@@ -154,7 +154,7 @@ def test_pairs_say_what_a_small_square_of_two_joints_turns_the_body_by():
 def test_wrong_arguments_are_refused():
     body = sp.load_body("diver")
     for ask, error in (
-        (lambda: sp.reachable("diver"), WrongObjectError),
+        (lambda: sp.reachable(3.0), WrongObjectError),
         (lambda: sp.reachable(body, [0.0]), ShapeError),
         (lambda: sp.reachable(body, most_orders=1), ShapeError),
         (lambda: sp.reachable(body, most_orders=7), ShapeError),

@@ -55,6 +55,8 @@ class Visual:
     vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
     faces: Integers = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
 
+    __repr__ = short_repr
+
     @property
     def corners(self) -> Array:
         """Corners of the box around the shape, in its own axes: (8, 3) [m]."""

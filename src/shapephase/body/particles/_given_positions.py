@@ -14,7 +14,7 @@ from ...arrays import Array, finite_array
 from ...errors import ShapeError
 from ...letters import value_text
 from ..engines.chain import WEIGHTS
-from ._casadi_positions import derivatives_function
+from .casadi_positions import derivatives_function
 
 Places = Callable[[Array], tuple[ArrayLike, ArrayLike]]
 _STEP = 0.02  # of differences for second derivatives: errors of 1e-13 where places swing once in a radian

@@ -18,8 +18,8 @@ from ...errors import ShapeError, WrongObjectError, unknown_name
 from ...letters import value_text
 from ..couplings.coordinate_map import CoordinateMap
 from ..shape_arguments import ShapeArguments
-from ._casadi_positions import CasadiPositions, is_casadi_function, particle_maps
 from ._given_positions import GivenPositions, Places
+from .casadi_positions import CasadiPositions, is_casadi_function, particle_maps
 
 
 @dataclass(frozen=True, eq=False)

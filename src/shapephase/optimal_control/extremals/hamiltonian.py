@@ -16,7 +16,7 @@ from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_no_balls, check_smooth
 from ...body.loading import as_body_or_particles
-from ...body.particles._casadi_positions import symbol_kind
+from ...body.particles.casadi_positions import symbol_kind
 from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...body.body import Body
-from ...body.particles._casadi_positions import symbol_kind
+from ...body.particles.casadi_positions import symbol_kind
 from ...body.particles.point_masses import ParticleBody
 from .._spline_basis import SplineBasis
 from ..symbolic import joint_coordinates, quaternion_rate, solve_linear, turned_back

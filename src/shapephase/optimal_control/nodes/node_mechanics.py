@@ -30,7 +30,7 @@ import numpy as np
 from ...arrays import Array
 from ...body.body import Body
 from ...body.joint_chain import JointChain
-from ...body.particles._casadi_positions import symbol_kind
+from ...body.particles.casadi_positions import symbol_kind
 from ...body.particles.point_masses import ParticleBody
 from ..symbolic import joint_frames, symbolic_body
 from .spatial import Twist, gathered, links_of, passed_on, screws_of

@@ -79,12 +79,17 @@ def distance_enclosure(
     width : relative to the distance
     most_cells : of work; where they do not suffice the enclosure is wider
 
+    Notes
+    -----
+    Equations :eq:`cell-deviation`, :eq:`cell-rest`, :eq:`way-left`, :eq:`climb` and :eq:`second-variation` of the
+    documentation.
+
     Examples
     --------
     >>> metric = sp.rigid_body.geodesics.left_invariant_metric([1.0, 2.0, 3.0])
     >>> found = sp.rigid_body.geodesics.distance_enclosure(metric, sp.so3.exp(np.array([0.0, 0.5, 0.0])))
-    >>> print(found.certified, f"{found.lower:.3f} to {found.upper:.3f}")
-    True 0.706 to 0.707
+    >>> print(found.certified, f"{found.lower:.6f} to {found.upper:.6f}")
+    True 0.707107 to 0.707107
     """
     return _distance(metric, goal_of(metric, attitude), width, most_cells)
 

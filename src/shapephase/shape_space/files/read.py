@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Unpack
 
@@ -13,7 +13,7 @@ from ...arguments import made_by
 from ...arrays import Array
 from ...body.body import Body
 from ...body.loading import as_body
-from ...display import frozen
+from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ..shape_path import ShapePath, without_joints
 from ._joint_columns import JointChoices, Matched, matched
@@ -34,7 +34,7 @@ _MOST_SAMPLES = 2_000_000  # of a resampled path: 16 MB for each joint
 
 
 @made_by(ShapePath="it is recorded.path")
-@frozen
+@dataclass(frozen=True, eq=False)
 class RecordedMotion:
     """Recorded joint motion and the path made of it. Made by `read_recorded_motion`.
 
@@ -71,6 +71,8 @@ class RecordedMotion:
     segments: SegmentMotion | None = None
     wheel_speeds: Mapping[str, ShapePath] = field(default_factory=dict)
     base_rates: Array | None = None
+
+    __repr__ = short_repr
 
 
 @show_options(ReadingOptions)
