@@ -41,8 +41,8 @@ DIVER = sp.load_body("diver")
 SWING = sp.ShapePath.waypoints([0.0, 1.0], [[0.0, 0.5], [1.0, -0.4]])
 # They make objects or figures, write files or need more than a few numbers, and are called by name below or elsewhere.
 MAKERS = (
-    "circle", "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias", "with_wheel",
-    "with_frame_inertias", "sampler", "samplers", "plot", "view", "to_dataframe", "to_xarray",
+    "circle", "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias",
+    "with_wheel", "with_frame_inertias", "sampler", "samplers", "plot", "view", "to_dataframe", "to_xarray",
 )  # fmt: skip
 
 
