@@ -116,6 +116,7 @@ def translating(motion):
 
 @pytest.mark.parametrize("function", [swallowing, translating])
 def test_ctrl_c_is_not_lost_in_a_case(tmp_path, function):
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background job does not have
     study = room.Study(RIGID, draws=3, chunk=1, outputs=(room.Output("value", function),))
     with pytest.raises(KeyboardInterrupt):
         study.run(tmp_path / "out.zarr", workers=0)
