@@ -459,7 +459,7 @@ def linked_pentagon() -> ParticleBody:
     import casadi
 
     chart, free, closing = (casadi.SX.sym(name, 2) for name in ("chart", "free", "closing"))
-    even = 0.4 * np.pi * np.arange(5)
+    even = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
     slow, fast = (casadi.DM(np.stack([np.cos(f * even), np.sin(f * even)], axis=1)) for f in (1, 2))
     headings = even + fast @ free + slow @ closing
     edges = casadi.horzcat(casadi.cos(headings), casadi.sin(headings))
@@ -470,7 +470,7 @@ def linked_pentagon() -> ParticleBody:
         closed = newton(closed, inside)
     corners = casadi.substitute(casadi.cumsum(edges), casadi.vertcat(free, closing), casadi.vertcat(inside, closed))
     places = casadi.Function("corners", [chart], [corners])
-    return particle_body(np.ones(5), places, ["a", "b"], name="linked pentagon")
+    return particle_body(np.ones_like(even), places, ["a", "b"], name="linked pentagon")
 
 
 def named_example(name: str) -> Example:

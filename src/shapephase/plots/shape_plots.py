@@ -60,8 +60,7 @@ def plot_shape_path(
     >>> len(sp.plots.plot_shape_path(ax, sp.examples.kane_scher(0.0, 0.5)).lines)  # one for each joint
     3
     """
-    if body is not None:
-        body = as_body_or_particles(body)
+    body = None if body is None else as_body_or_particles(body)
     path = as_path(path, body)
     style.check_flat_axes(ax)
     t = style.even_times(path, times)
@@ -120,8 +119,7 @@ def plot_shape_plane(
     >>> len(sp.plots.plot_shape_plane(ax, path, (0, 1)).lines) >= 1
     True
     """
-    if body is not None:
-        body = as_body_or_particles(body)
+    body = None if body is None else as_body_or_particles(body)
     path = as_path(path, body)
     style.check_flat_axes(ax)
     t = style.even_times(path, times)
