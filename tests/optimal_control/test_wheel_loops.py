@@ -16,6 +16,7 @@ from shapephase.optimal_control import (
     Limits,
     Search,
     conjugate_times,
+    extremal,
     plan_reorientation,
     shoot,
     small_loop,
@@ -95,6 +96,21 @@ def test_the_circle_of_two_wheels_is_an_extremal_of_any_size(craft):
     np.testing.assert_allclose(so3.angle(turn), 2.0 * np.pi * (size - 1.0), rtol=1e-11)
     first, second = 1.05 * slope_of(1.0) * np.array(MOMENTS[:2]) / WHEELS
     check_circle(craft, sp.ShapePath.fourier([0.0, 0.0], [[0.0], [second]], [[-first], [0.0]], 1.0), 1.0)
+
+
+def test_the_circle_of_two_wheels_ceases_to_be_cheapest_where_it_turns_the_body_right_round(craft):
+    """At the charge 2 pi K (s, 0, 1) the wheels draw it from rates along the first axle."""
+    angle = 2.0 * np.pi
+    slope = slope_of(angle)
+    rate = [-2.0 * np.pi * slope * MOMENTS[0] / WHEELS[0], 0.0]
+    charge = 2.0 * np.pi * STIFFNESS * np.array([slope, 0.0, 1.0])
+    path = extremal(craft, [0.0, 0.0], rate, charge, 1.0, tolerance=1e-13)
+    np.testing.assert_allclose(path.shape(1.0), 0.0, atol=1e-9)
+    np.testing.assert_allclose(path.attitude(1.0), np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(path.cost, 0.5 * STIFFNESS * angle * (4.0 * np.pi + angle), rtol=1e-12)
+    times = [meeting.time for meeting in conjugate_times(path, until=1.5)]
+    np.testing.assert_allclose(times, meetings(angle, 1.5), rtol=1e-7)
+    np.testing.assert_allclose(times[0], 1.0, rtol=1e-7)
 
 
 @pytest.mark.full
