@@ -357,6 +357,16 @@ def _holonomies() -> list[Entry]:
             )
             for disc, number in ((3.0, "-120.000000"), (5.0, "-90.000000"))
         ),
+        Entry(
+            topic=_HOLONOMIES,
+            what="the largest turn of a linked pentagon in one round",
+            source="tong2012",
+            inputs="five equal masses and edges",
+            published="28.15937237",
+            unit="°",
+            computed=cases.pentagon_turn,
+            is_slow=True,
+        ),
     ]
 
 

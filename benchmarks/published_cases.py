@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from scipy.optimize import root_scalar
+from scipy.optimize import brentq, root_scalar
 
 import shapephase as sp
 from shapephase.optimal_control import Limits, path_cost, plan_reorientation, shoot
@@ -220,6 +220,18 @@ def ant_on_a_disc(disc: float) -> float:
     body = sp.particle_body(masses, places, ["angle"], continuous=["angle"])
     path = sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [2.0 * np.pi]], joint_names=["angle"])
     return float(np.degrees(sp.so3.angle_about(sp.holonomy(body, path, tolerance=1e-11), np.array([0.0, 0.0, 1.0]))))
+
+
+def pentagon_turn() -> float:
+    """Degrees that the loop of zero curvature turns a linked pentagon by, from 120 rays and their Fourier series."""
+    pentagon, shapes = sp.examples.linked_pentagon(), []
+    for angle in 2.0 * np.pi * np.arange(120) / 120.0:
+        ray = np.array([np.cos(angle), np.sin(angle)])
+        size = brentq(lambda size, ray=ray: sp.curvature(pentagon, size * ray)[0, 1, 2], 1.0, 2.5, xtol=1e-10)
+        shapes.append(size * ray)
+    waves = np.fft.rfft(shapes, axis=0)[:-1].T / len(shapes)
+    loop = sp.ShapePath.fourier(waves[:, 0].real, 2.0 * waves[:, 1:].real, -2.0 * waves[:, 1:].imag, 1.0)
+    return float(np.degrees(sp.so3.angle(sp.holonomy(pentagon, loop, tolerance=1e-12))))
 
 
 def euler_days() -> float:

@@ -137,16 +137,19 @@ def pentagon():
     return sp.particle_body(np.ones(5), ca.Function("corners", [free], [corners]), ["free_1", "free_2"])
 
 
-def test_the_optimal_pentagon_turns_as_published():
+@pytest.mark.parametrize(
+    ("made", "low", "high"), [(pentagon, 0.7, 1.0), (sp.examples.linked_pentagon, 1.0, 2.5)], ids=["written", "shipped"]
+)
+def test_the_optimal_pentagon_turns_as_published(made, low, high):
     """The loop of zero curvature; next to it the turn changes in second order only, so that 60 rays are enough."""
-    body = pentagon()
+    body = made()
     angles = 0.5 * np.pi + 0.4 * np.pi * np.arange(7) / 12.0
     rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
     def turning(s, ray):
         return sp.curvature(body, s * ray)[0, 1, 2]
 
-    sizes = [brentq(turning, 0.7, 1.0, args=(ray,), xtol=1e-5) for ray in rays]
+    sizes = [brentq(turning, low, high, args=(ray,), xtol=1e-5) for ray in rays]
     # Of a fifth of the loop the second half mirrors the first.
     sizes = np.append(np.tile(np.concatenate([sizes[:-1], sizes[:0:-1]]), 5), sizes[0])
     around = 0.5 * np.pi + 2.0 * np.pi * np.arange(61) / 60.0

@@ -41,7 +41,7 @@ def corners(direction):
     return ca.vertcat((-one / 2).T, (one / 2).T, two.T)
 
 
-def triangle(chart):
+def triangle(chart, limits=None):
     """Its shape in the plane: "equal-area" (Lambert's), or "stereographic", about the pole."""
     r = ca.SX.sym("r", 2)
     square = ca.sumsqr(r)
@@ -49,7 +49,9 @@ def triangle(chart):
         direction = ca.vertcat(r * ca.sqrt(1.0 - square / 4.0), 1.0 - square / 2.0)
     else:
         direction = ca.vertcat(2.0 * r, 1.0 - square) / (1.0 + square)
-    return sp.particle_body(np.ones(3), ca.Function("corners", [r], [corners(direction)]), ["x", "y"], units="m")
+    return sp.particle_body(
+        np.ones(3), ca.Function("corners", [r], [corners(direction)]), ["x", "y"], units="m", limits=limits
+    )
 
 
 def random_parts(seed):
@@ -92,30 +94,32 @@ class Sines:
 # --- the sphere of triangles: a charge in the field of a monopole ------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def sphere_plan():
-    return plan_reorientation(
-        triangle("stereographic"), so3.exp(0.6 * Z), rates_at_ends="free", search=Search(pieces=40)
-    )
+def circle(angle, size=1.0):
+    """Circle through the pole, in the stereographic chart, whose solid angle is twice an angle."""
+    radius = 0.5 * size * np.tan(np.arccos(1.0 - angle / np.pi))
+    return sp.ShapePath.fourier([radius, 0.0], [[-radius], [0.0]], [[0.0], [radius]], 1.0)
 
 
-def test_the_cheapest_turn_of_three_bodies_costs_what_a_circle_on_their_sphere_does(sphere_plan):
+@pytest.mark.parametrize("starts", full_but([0, 1], 0))
+def test_the_cheapest_turn_of_three_bodies_costs_what_a_circle_on_their_sphere_does(starts):
     """theory of reorientation: theta (2 pi - theta) / (2 T) for unit inertia; its slope is the charge pi - theta."""
-    angle = 0.6
-    np.testing.assert_allclose(sphere_plan.cost, 0.5 * angle * (2.0 * np.pi - angle), rtol=1e-8)
-    fit = wong_residual(sphere_plan.body, sphere_plan.path)
+    angle, body = 0.6, triangle("stereographic")
+    search = Search(pieces=40, starts=starts, guess=None if starts else circle(angle, 0.8))
+    plan = plan_reorientation(body, so3.exp(angle * Z), rates_at_ends="free", search=search)
+    np.testing.assert_allclose(plan.cost, 0.5 * angle * (2.0 * np.pi - angle), rtol=1e-8)
+    fit = wong_residual(body, plan.path)
     np.testing.assert_allclose(fit.charge, (np.pi - angle) * Z, rtol=0, atol=1e-3)
     assert fit.residual < 1e-3
-    near = sphere_plan.path.shape(np.linspace(0.0, 1.0, 41))
+    near = plan.path.shape(np.linspace(0.0, 1.0, 41))
     directions = np.concatenate([2.0 * near, 1.0 - np.sum(near**2, axis=1, keepdims=True)], axis=1)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     # A circle lies in a plane.
     assert np.linalg.svd(directions - directions.mean(axis=0), compute_uv=False)[2] < 1e-5
 
 
-def test_its_extremal_closes_at_a_conjugate_time(sphere_plan):
+def test_its_extremal_closes_at_a_conjugate_time():
     """The circle may be turned about its first point, so that neighbours meet where it closes."""
-    exact = shoot(sphere_plan.body, sphere_plan.path, sphere_plan.goal.rotation)
+    exact = shoot(triangle("stereographic"), circle(0.6, 0.95), so3.exp(0.6 * Z))
     np.testing.assert_allclose(exact.cost, 0.3 * (2.0 * np.pi - 0.6), rtol=2e-9)
     np.testing.assert_allclose(exact.charge, (np.pi - 0.6) * Z, rtol=0, atol=1e-8)
     (meeting,) = conjugate_times(exact)
@@ -133,11 +137,12 @@ def test_a_charge_in_a_constant_field_goes_round_in_circles():
         around = exact.shape(np.linspace(0.0, 1.0, 32, endpoint=False))
         radii = np.linalg.norm(around - around.mean(axis=0), axis=1)
         np.testing.assert_allclose(radii, np.sqrt(2.0 * angle / np.pi), rtol=1e-9)
+    search, start = Search(pieces=24, starts=0, guess=loop.path(0.8 * angle)), loop.path(0.8 * angle).shape(0.0)
     plan = plan_reorientation(
-        body, so3.exp(angle * Z), cost=np.eye(2), start=[0.2, -0.1], rates_at_ends="free", search=Search(pieces=24)
+        body, so3.exp(angle * Z), cost=np.eye(2), start=start, rates_at_ends="free", search=search
     )
     np.testing.assert_allclose(plan.cost, 4.0 * np.pi * angle, rtol=1e-6)
-    assert (plan.cost_name, plan.cost_unit) == ("metric", "")
+    assert (plan.cost_name, plan.cost_unit, len(plan.starts)) == ("metric", "", 1)
     np.testing.assert_allclose(path_cost(body, plan.path, np.eye(2)), plan.cost, rtol=1e-13)
 
 
@@ -195,49 +200,100 @@ def test_small_loops_are_ellipses_in_a_metric_of_unequal_axes():
 # --- the pentagon -------------------------------------------------------------------------------------------
 
 
-LARGEST_TURN = 28.15937237
-"""[degrees] of a loop of pentagons with unit edges. Tong and Dullin, SIAM J. Applied Dynamical Systems 11 (2012)."""
+LARGEST_TURN, ITS_COST = 28.159372374545848, 28.1894387991082
+"""[degrees], [J s]: the loop of zero curvature at even pace, by mpmath in 30 digits with 48 Fourier coefficients.
 
-
-def pentagon(limit=None):
-    """Corners of unit mass on a closed chain of unit edges, in a chart of a disc if there is no limit."""
-    k = np.arange(5)
-    free, rest = ca.SX.sym("free", 2), ca.SX.sym("rest", 2)
-    slow, fast = (ca.DM(np.stack([np.cos(f * k), np.sin(f * k)], axis=1)) for f in (0.4 * np.pi, 0.8 * np.pi))
-    headings = 0.4 * np.pi * k + fast @ free + slow @ rest
-    edges = ca.horzcat(ca.cos(headings), ca.sin(headings))
-    gap = ca.sum1(edges).T
-    nearer, closing = (
-        ca.Function("nearer", [rest, free], [rest - ca.solve(ca.jacobian(gap, rest), gap)]),
-        ca.SX.zeros(2),
-    )
-    for _ in range(6):
-        closing = nearer(closing, free)
-    corners, chart = ca.substitute(ca.cumsum(edges), rest, closing), ca.SX.sym("chart", 2)
-    shape = chart if limit else 1.1 * chart / ca.sqrt(1.0 + ca.sumsqr(chart))
-    places = ca.Function("corners", [chart], [ca.substitute(corners, free, shape)])
-    limits = dict.fromkeys(["free_1", "free_2"], (-limit, limit)) if limit else None
-    return sp.particle_body(np.ones(5), places, ["free_1", "free_2"], limits=limits)
+Published is 28.15937237: Tong and Dullin, SIAM J. Applied Dynamical Systems 11 (2012).
+"""
 
 
 @pytest.mark.full
-def test_charges_of_the_pentagon_lead_to_its_largest_turn():
-    """Near the loop of zero curvature the turn lacks a square of the distance, which is one over the charge."""
-    body, turns, charges = pentagon(), np.array([27.0, 28.0, 28.1]), []
-    start = np.array([brentq(lambda size: sp.curvature(body, [size, 0.0])[0, 1, 2], 0.6, 2.5), 0.0])
-    around = 2.0 * np.pi * np.linspace(0.0, 1.0, 41)
-    path = sp.ShapePath.spline(around / (2.0 * np.pi), start[0] * np.stack([np.cos(around), np.sin(around)], axis=1))
-    for turn in np.radians(turns):
-        search = Search(pieces=40, guess=path)
-        plan = plan_reorientation(body, so3.exp(turn * Z), start=start, rates_at_ends="free", search=search)
+def test_plans_of_the_pentagon_lead_to_its_largest_turn():
+    """Turns lack a/l^2 + b/l^2.5 + ... of the largest, l the charge, and costs by dC = l dtheta.
+
+    Half powers come from the given first shape, which is on the loop of zero curvature; the rest stays inside of it.
+    """
+    body, costs, charges = sp.examples.linked_pentagon(), [], []
+    size = brentq(lambda size: sp.curvature(body, [size, 0.0])[0, 1, 2], 1.0, 2.5, xtol=1e-14)
+    # A circle turns further than the first plan: at the largest turn no change of the path changes it.
+    path = sp.ShapePath.fourier([0.0, 0.0], [[size], [0.0]], [[0.0], [-size]], 1.0)
+    turns = np.radians([27.9, 28.15, 28.155, 28.158])
+    for turn in turns:
+        search = Search(pieces=80, starts=0, guess=path)
+        plan = plan_reorientation(body, so3.exp(turn * Z), start=[size, 0.0], rates_at_ends="free", search=search)
         assert plan.goal_error < 1e-9
         path = plan.path
+        costs.append(plan.cost)
         charges.append(wong_residual(body, path).charge[2])
-    assert (np.diff(charges) > 0.0).all()
-    charges = np.array(charges)
-    largest = np.linalg.solve(np.stack([np.ones(3), -(charges**-2), -(charges**-3)], axis=1), turns)[0]
-    # The next term of the series is seen at 27 degrees.
-    assert abs(largest - LARGEST_TURN) < 5e-3
+    turns, costs, charges = turns[1:], costs[1:], np.array(charges[1:])[:, None]
+    powers = np.array([2.0, 2.5, 3.0])
+    ones, none = np.ones_like(charges), np.zeros_like(charges)
+    rows = np.block(
+        [[ones, none, -(charges**-powers)], [none, ones, -powers / (powers - 1.0) * charges ** (1 - powers)]]
+    )
+    weights = np.concatenate([charges**2, charges])
+    found = np.linalg.lstsq(weights * rows, weights[:, 0] * np.concatenate([turns, costs]), rcond=None)[0]
+    assert abs(np.degrees(found[0]) - LARGEST_TURN) < 2e-6
+    assert abs(found[1] - ITS_COST) < 1e-3
+
+
+# --- continuous bodies --------------------------------------------------------------------------------------
+
+
+def deformed(places, deformation, parameters, mass):
+    """Points of equal mass at these places of a body at rest, moved by a matrix that depends on parameters."""
+    function = ca.Function("places", [parameters], [ca.DM(places) @ deformation.T])
+    names = list("abc")[: parameters.shape[0]]
+    return sp.particle_body(np.full(len(places), mass / len(places)), function, names, units="m")
+
+
+def test_six_points_are_an_ellipsoid_that_deforms_linearly():
+    """Against the second moments E = m a^2 / 5: S = F E F', I = tr S - S, J from F_k E F', M_kl = tr F_k E F_l'."""
+    axes, mass, r = np.array([1.0, 0.7, 0.4]), 3.0, ca.SX.sym("r", 3)
+    move = ca.vertcat(ca.horzcat(ca.exp(r[0]), r[1], r[2] ** 2), ca.horzcat(0.0, 1.0, r[0] * r[2]), ca.DM([[0, 0, 1]]))
+    points = np.sqrt(0.6) * np.diag(axes)
+    functions = symbolic_body(deformed(np.concatenate([points, -points]), move, r, mass))
+    a, b, c = shape = np.array([0.3, -0.4, 0.5])
+    now = np.array([[np.exp(a), b, c**2], [0.0, 1.0, a * c], [0.0, 0.0, 1.0]])
+    slopes = np.zeros((3, 3, 3))
+    slopes[0, 0, 0], slopes[0, 1, 2], slopes[1, 0, 1], slopes[2, 0, 2], slopes[2, 1, 2] = np.exp(a), c, 1.0, 2.0 * c, a
+    moments = np.diag(mass * axes**2 / 5.0)
+    second = now @ moments @ now.T
+    inertia = np.trace(second) * np.eye(3) - second
+    turning = now @ moments @ np.swapaxes(slopes, 1, 2)
+    matrix = np.stack([turning[:, i, j] - turning[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))])
+    still = np.einsum("kij,jl,mil->km", slopes, moments, slopes)
+    np.testing.assert_allclose(functions.inertia(shape), inertia, rtol=0, atol=20 * EPS)
+    np.testing.assert_allclose(functions.momentum_matrix(shape), matrix, rtol=0, atol=20 * EPS)
+    metric = still - matrix.T @ np.linalg.solve(inertia, matrix)
+    np.testing.assert_allclose(functions.shape_metric(shape), metric, rtol=0, atol=20 * EPS)
+
+
+def test_points_of_a_quadrature_are_a_wire_that_deforms_in_modes():
+    """z = exp(i s) + w exp(-2 i s) round it: the curvature is 2 / (1 + |w|^2)^2."""
+    s, w = 2.0 * np.pi * np.arange(8) / 8.0, ca.SX.sym("w", 2)
+    cosine, sine = ca.DM(np.cos(2.0 * s)), ca.DM(np.sin(2.0 * s))
+    places = ca.horzcat(np.cos(s) + w[0] * cosine + w[1] * sine, np.sin(s) + w[1] * cosine - w[0] * sine)
+    wire = sp.particle_body(
+        np.full(8, 2.0 / 8.0), ca.Function("places", [w], [places]), ["real", "imaginary"], units="m"
+    )
+    shape = np.array([0.3, -0.6])
+    square = 1.0 + shape @ shape
+    np.testing.assert_allclose(sp.curvature(wire, shape)[0, 1], 2.0 / square**2 * Z, rtol=0, atol=20 * EPS)
+    # The metric of the rates that leave no momentum is that of a sphere.
+    np.testing.assert_allclose(small_loop(wire, [0.0, 0.0]).cost(1e-3), 2.0 * np.pi * 1e-3, rtol=1e-13)
+
+
+@pytest.mark.full
+def test_a_lamina_that_deforms_linearly_turns_as_cheaply_as_three_bodies():
+    """z -> (z + w z*) / sqrt(1 + |w|^2) of a disc keeps its inertia m a^2 / 2: its shapes are a sphere, too."""
+    mass, radius, angle, w = 3.0, 0.8, 0.6, ca.SX.sym("w", 2)
+    move = ca.vertcat(ca.horzcat(1.0 + w[0], w[1]), ca.horzcat(w[1], 1.0 - w[0])) / ca.sqrt(1.0 + ca.sumsqr(w))
+    points = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]) * radius / np.sqrt(2.0)
+    lamina = deformed(points, move, w, mass)
+    plan = plan_reorientation(lamina, so3.exp(angle * Z), rates_at_ends="free", search=Search(pieces=40))
+    cost = 0.5 * mass * radius**2 * 0.5 * angle * (2.0 * np.pi - angle)
+    np.testing.assert_allclose(plan.cost, cost, rtol=1e-8)
 
 
 # --- a transcription of another kind ------------------------------------------------------------------------
@@ -299,7 +355,8 @@ def spectral_optimum(masses, parts, goal, plan):
     return float(result["f"])
 
 
-@pytest.mark.parametrize("seed", full_but(range(10), 8))
+@pytest.mark.full
+@pytest.mark.parametrize("seed", range(10))
 def test_plans_of_random_bodies_cost_what_another_transcription_finds(seed):
     rng = np.random.default_rng(100 + seed)
     body, (masses, parts) = random_body(seed), random_parts(seed)
@@ -323,11 +380,10 @@ def test_places_by_a_function_of_python_give_the_same_mechanics():
 @pytest.mark.full
 def test_a_plan_by_a_function_of_python_is_that_of_the_function_of_casadi():
     """Second and third derivatives are differences there; the optimum depends on the first alone."""
-    places, goal = Sines(0), so3.exp(0.15 * Z)
-    given, search = sp.particle_body(places.masses, places, ["a", "b"]), Search(pieces=12, iterations=60)
-    costs = [
-        plan_reorientation(body, goal, rates_at_ends="free", search=search).cost for body in (given, random_body(0))
-    ]
+    places, body = Sines(0), random_body(0)
+    given, path = sp.particle_body(places.masses, places, ["a", "b"]), small_loop(body, [0.0, 0.0]).path(0.15)
+    options = {"start": path.shape(0.0), "rates_at_ends": "free", "search": Search(pieces=12, starts=0, guess=path)}
+    costs = [plan_reorientation(one, so3.exp(0.15 * Z), **options).cost for one in (given, body)]
     np.testing.assert_allclose(*costs, rtol=1e-9)
 
 
@@ -346,11 +402,11 @@ def test_a_plan_by_a_function_of_python_is_that_of_the_function_of_casadi():
         (so3.exp(0.3 * Z), {"cost": np.eye(3)}, ShapeError, r"2, 2\)"),
         (so3.exp(0.3 * Z), {"cost": ca.Function("g", [ca.SX.sym("r", 2)], [1.0])}, ShapeError, "casadi.Function"),
         (so3.exp(0.3 * Z), {"cost": "metric"}, UnknownNameError, "kinetic"),
-        (so3.exp(0.3 * Z), {"start": [2.0, 0.0]}, sp.errors.TrajectoryError, "free_1"),
+        (so3.exp(0.3 * Z), {"start": [2.0, 0.0]}, sp.errors.TrajectoryError, "x"),
     ],
 )
 def test_what_particles_cannot_do_is_refused(goal, options, error, match):
-    body = pentagon(1.2) if "start" in options else triangle("equal-area")
+    body = triangle("equal-area", {"x": (-1.0, 1.0)})
     with pytest.raises(error, match=match):
         plan_reorientation(body, goal, **options)
 

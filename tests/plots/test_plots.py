@@ -747,6 +747,18 @@ def test_the_curvature_is_that_of_small_loops(cat):
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("waist_pitch [deg]", "waist_yaw [deg]")
 
 
+def test_paths_of_particles_are_drawn_on_their_curvature():
+    body = sp.examples.linked_pentagon()
+    loop = sp.ShapePath.fourier([0.0, 0.0], [[1.0], [0.0]], [[0.0], [1.0]], 1.0, joint_names=body.joint_names)
+    ax = plots.plot_curvature(flat_axes(2.8), body, ("b", "a"), path=loop)
+    mesh = ax.collections[0]
+    x, y = np.moveaxis(np.asarray(mesh.get_coordinates()), -1, 0)
+    here = sp.curvature(body, np.stack([y, x], axis=-1)[::9, ::9])[..., 1, 0, 2]
+    assert np.asarray(mesh.get_array()).reshape(x.shape)[::9, ::9] == pytest.approx(np.degrees(here), rel=1e-12)
+    assert plots.plot_shape_plane(flat_axes(2.6), loop, (0, 1), body).get_xlabel() == "a [deg]"
+    assert len(plots.plot_shape_path(flat_axes(2.6), loop, body).lines) == 2
+
+
 def test_contours_of_the_curvature_tell_its_sign_without_colours(cat):
     ax = plots.plot_curvature(flat_axes(2.8), cat, ("waist_pitch", "waist_yaw"), path=cat_righting(0.5))
     mesh, lines = ax.collections[:2]

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_choice, check_flag, check_object, moments_argument, number_argument
 from ..arrays import Array
 from ..body.loading import load_body
+from ..body.particles.point_masses import ParticleBody, particle_body
 from ..deformation.assemblies import assembly, moving_mass, rigid_part
 from ..deformation.deformation import articulated, prescribed, rigid
 from ..errors import ShapeError, TrajectoryError
@@ -45,6 +46,7 @@ from .slow_deformation import slow_antenna
 
 _HALF_TURN_CONE = 59.426458741516  # [degrees] half angle by which Kane and Scher's cat turns by exactly 180 degrees
 _DEGREE = np.pi / 180.0
+_CLOSING_STEPS = 5  # Newton's, from 0: a gap below 2e-15 in all shapes of the pentagon
 
 
 def homothety(
@@ -434,6 +436,41 @@ EXAMPLES: Mapping[str, Callable[[], Example]] = {
     "astronaut": astronaut,
     "rigid_body": rigid_body,
 }
+
+
+def linked_pentagon() -> ParticleBody:
+    """Closed chain of five unit edges in a plane, with unit masses at its corners: any two numbers are a shape of it.
+
+    The regular pentagon is the shape zero. Edge k points along 2 pi k/5 + Re(f exp(-4 pi i k/5) + c exp(-2 pi i k/5)),
+    where f = 1.1 (a + i b)/sqrt(1 + a^2 + b^2) and c closes the chain. The loop of zero curvature turns it by
+    28.15937237 degrees, the most for one round.
+
+    Notes
+    -----
+    Source: Tong and Dullin 2012, The equilateral pentagon at zero angular momentum.
+
+    Examples
+    --------
+    >>> pentagon = sp.examples.linked_pentagon()
+    >>> edges = np.diff(pentagon.positions([2.0, -0.5]), axis=0)
+    >>> np.linalg.norm(edges, axis=1).round(12).tolist()
+    [1.0, 1.0, 1.0, 1.0]
+    """
+    import casadi
+
+    chart, free, closing = (casadi.SX.sym(name, 2) for name in ("chart", "free", "closing"))
+    even = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
+    slow, fast = (casadi.DM(np.stack([np.cos(f * even), np.sin(f * even)], axis=1)) for f in (1, 2))
+    headings = even + fast @ free + slow @ closing
+    edges = casadi.horzcat(casadi.cos(headings), casadi.sin(headings))
+    gap = casadi.sum1(edges).T
+    newton = casadi.Function("newton", [closing, free], [closing - casadi.solve(casadi.jacobian(gap, closing), gap)])
+    inside, closed = 1.1 * chart / casadi.sqrt(1.0 + casadi.sumsqr(chart)), casadi.SX.zeros(2)
+    for _ in range(_CLOSING_STEPS):
+        closed = newton(closed, inside)
+    corners = casadi.substitute(casadi.cumsum(edges), casadi.vertcat(free, closing), casadi.vertcat(inside, closed))
+    places = casadi.Function("corners", [chart], [corners])
+    return particle_body(np.ones_like(even), places, ["a", "b"], name="linked pentagon")
 
 
 def named_example(name: str) -> Example:

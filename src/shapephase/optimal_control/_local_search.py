@@ -173,10 +173,10 @@ def _tightened(
 def corrected_attempt(task: Reorientation, basis: SplineBasis, solution: NlpSolution, began: float) -> Attempt:
     """Correct a solver's path, the result of a search that began at a time [s], to reach the goal."""
     polished, cost, reaches_goal, closest = None, np.inf, False, ()
-    with suppress(ShapePhaseError):  # where the path has no motion
-        polished = polish(task, basis, solution.control, solution.duration, solution.via_places)
+    with suppress(ShapePhaseError):  # where the path has no motion or no finite cost
+        corrected = polish(task, basis, solution.control, solution.duration, solution.via_places)
+        cost, polished = _cost(task, basis, corrected), corrected
     if polished is not None:
-        cost = _cost(task, basis, polished)
         closest = closest_links(task, polished.path)
         reaches_goal = polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
     report = Start(

@@ -298,8 +298,8 @@ class CollocationProgram:
         # The local name keeps it alive: CasADi does not.
         callback = ipopt_callback(best, len(guess), rows_low, rows_high)
         given = {"ipopt": options, "print_time": False, "iteration_callback": callback, **self.derivatives}
-        # Distances have no derivatives of CasADi's own.
-        given["no_nlp_grad"] = True
+        # Distances have no derivatives of CasADi's own. IPOPT shortens a step to where a function has no value.
+        given |= {"no_nlp_grad": True, "show_eval_warnings": False}
         solver = casadi.nlpsol("plan", "ipopt", self.program, given)
         low, high = self._bounds()
         result = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=rows_low, ubg=rows_high)

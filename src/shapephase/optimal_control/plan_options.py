@@ -239,7 +239,8 @@ class Search:
     starts : number of local searches from different guesses, up to 1000; the cheapest plan is returned. For up to eight
         free joints, and for up to twelve with several starts, they are the best of more guesses, up to sixteen, by a
         coarse search. For up to eight, two further guesses are tried where none leads to a plan, then a motion of many
-        equal strokes; that comes first where two joints cannot turn the body so far in four rounds
+        equal strokes; that comes first where two joints cannot turn the body so far in four rounds. 0: the search
+        from `guess` alone, as where plans follow a goal that moves
     seed : seed of the random guesses; equal seeds give equal plans
     pieces : pieces of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and
         "rate", else 40 for up to eight, 20 for more, and up to four times as many where the path misses the goal; a
@@ -274,7 +275,7 @@ class Search:
             check_object(self.guess, "ShapePath", "guess")
         if self.pieces is not None:
             _check_count(self.pieces, "pieces", _LEAST_PIECES, _MOST_PIECES)
-        _check_count(self.starts, "starts", 1, _MOST_STARTS)
+        _check_count(self.starts, "starts", 1 if self.guess is None else 0, _MOST_STARTS)
         _check_count(self.seed, "seed", 0)
         _check_count(self.iterations, "iterations", 1, _MOST_ITERATIONS)
         if self.time_limit is not None:

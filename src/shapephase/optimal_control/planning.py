@@ -206,7 +206,7 @@ def _searches(
         (far if beyond and search.guess is None else near).append(task)
     if near:
         yield _searched_by_loops(near, search, monitor, executor)
-    yield chain.from_iterable(_searched_by_strokes(task, search, monitor) for task in tasks)
+    yield chain.from_iterable(_searched_by_strokes(task, search, monitor) for task in tasks if search.starts)
     if far:
         yield _searched_by_loops(far, search, monitor, executor)
 
@@ -241,6 +241,8 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonito
         basis = SplineBasis(int(search.pieces or pieces))
         guess = None if search.guess is None else guess_of_path(task, basis, search.guess)
         first.extend([] if guess is None else [(task, basis, guess)])
+        if not search.starts:
+            continue
         try:
             found = _starting_points(task, basis, search, monitor)
         except PlanNotFound:  # the user's own guess is enough

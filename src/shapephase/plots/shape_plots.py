@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object, whole_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..body.loading import as_body
+from ..body.loading import as_body_or_particles
+from ..body.particles.point_masses import ParticleBody
 from ..errors import ShapeError
 from ..letters import value_text
 from ..shape_space.body_path import as_path, in_joint_order
@@ -35,7 +36,7 @@ _AXES = "xyz"
 def plot_shape_path(
     ax: Axes,
     path: ShapePath | str,
-    body: Body | str | None = None,
+    body: Body | ParticleBody | str | None = None,
     joints: Sequence[str | int] | None = None,
     *,
     times: ArrayLike | None = None,
@@ -59,8 +60,7 @@ def plot_shape_path(
     >>> len(sp.plots.plot_shape_path(ax, sp.examples.kane_scher(0.0, 0.5)).lines)  # one for each joint
     3
     """
-    if body is not None:
-        body = as_body(body)
+    body = None if body is None else as_body_or_particles(body)
     path = as_path(path, body)
     style.check_flat_axes(ax)
     t = style.even_times(path, times)
@@ -100,7 +100,7 @@ def plot_shape_plane(
     ax: Axes,
     path: ShapePath | str,
     joints: Sequence[str | int],
-    body: Body | str | None = None,
+    body: Body | ParticleBody | str | None = None,
     *,
     times: ArrayLike | None = None,
 ) -> Axes:
@@ -119,8 +119,7 @@ def plot_shape_plane(
     >>> len(sp.plots.plot_shape_plane(ax, path, (0, 1)).lines) >= 1
     True
     """
-    if body is not None:
-        body = as_body(body)
+    body = None if body is None else as_body_or_particles(body)
     path = as_path(path, body)
     style.check_flat_axes(ax)
     t = style.even_times(path, times)
@@ -134,7 +133,7 @@ def plot_shape_plane(
 
 def plot_curvature(
     ax: Axes,
-    body: Body | str,
+    body: Body | ParticleBody | str,
     joints: Sequence[str | int],
     first: ArrayLike | None = None,
     second: ArrayLike | None = None,
@@ -166,7 +165,7 @@ def plot_curvature(
     >>> sp.plots.plot_curvature(ax, cat, ("waist_pitch", "waist_yaw"), axis="x").get_xlabel()
     'waist_pitch [deg]'
     """
-    body = as_body(body)
+    body = as_body_or_particles(body)
     if path is not None:
         path = as_path(path, body)
     style.check_flat_axes(ax)
@@ -273,7 +272,7 @@ def _band_patch() -> Any:
     return Patch(facecolor=style.GREY, alpha=0.5, linewidth=0.0)
 
 
-def _row(values: ArrayLike | None, body: Body, joint: int, points: Array | None, name: str) -> Array:
+def _row(values: ArrayLike | None, body: Body | ParticleBody, joint: int, points: Array | None, name: str) -> Array:
     if values is not None:
         row = finite_array(values, name)
         if row.ndim != 1 or len(row) < 2 or np.any(np.diff(row) <= 0.0):
@@ -285,7 +284,7 @@ def _row(values: ArrayLike | None, body: Body, joint: int, points: Array | None,
     return even_row(low, high) if np.isfinite(low) and np.isfinite(high) else even_row(-np.pi, np.pi)
 
 
-def _named(path: ShapePath, body: Body | None) -> tuple[ShapePath, tuple[str, ...], tuple[str, ...]]:
+def _named(path: ShapePath, body: Body | ParticleBody | None) -> tuple[ShapePath, tuple[str, ...], tuple[str, ...]]:
     """The path in the body's order, names and units of its columns."""
     if body is not None:
         return in_joint_order(body, path), body.joint_names, body.joint_units
