@@ -154,6 +154,7 @@ def small_disk(place, size):
         subprocess.run(["umount", "--lazy", str(place)], check=True)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("writer", writers())
 def test_a_full_disk_leaves_the_old_file(writer, folder, write, place):
     target = folder / f"target.{writer.split('.')[1]}"
@@ -213,6 +214,7 @@ def test_what_may_not_be_written_to_stays_as_it_is(writer, folder, write):
     assert stat.S_IMODE(kept.stat().st_mode) == 0o666
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("writer", writers())
 def test_what_is_no_file_is_refused_and_stays(writer, folder, write):
     ending = writer.split(".")[1]

@@ -12,6 +12,7 @@ import pytest
 import shapephase as sp
 from support.flown_bodies import body_of, flown
 from support.landings import landing
+from support.long_runs import full_but
 from support.planted_faults import planted, trajectory
 
 TIGHT = 1e-6
@@ -46,7 +47,7 @@ def test_all_runs_and_hypotheses_of_an_audit_are_on_its_page(tmp_path: Path):
     assert len(images(page)) == 4 + 8
 
 
-@pytest.mark.parametrize("width", [1280, 400])
+@pytest.mark.parametrize("width", full_but([1280, 400], 400))
 def test_the_page_fits_into_its_window(chromium, width: int, tmp_path: Path):
     case, file = planted("force", "diver", 1, 0.4), tmp_path / "audit.html"
     found = sp.audit(case.body, case.trajectory, tolerance=TIGHT, flight="all")

@@ -231,6 +231,7 @@ def test_a_recording_of_a_person_is_held_to_what_can_be_known():
     assert not sp.audit(body, sp.FloatingTrajectory(**given, captured=True), tolerance=1e-3).right
 
 
+@pytest.mark.full
 def test_what_no_body_can_have_is_no_hypothesis_and_a_star_leaves_a_fifth_at_most():
     """A torque of 30 N m from outside about the axis of the turn: the momentum doubles, which a trunk with a negative
     moment of inertia would explain."""

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase.errors import ShapeError
 from support.flown_bodies import body_of, flown
+from support.long_runs import full_but
 from support.planted_faults import trajectory
 
 
@@ -28,7 +29,9 @@ def names(found: sp.Audit) -> list[str]:
 
 
 @pytest.mark.parametrize("rates", [True, False])
-@pytest.mark.parametrize(("name", "every"), [("diver", 2), ("satellite", 5), ("cat_two_halves", 10)])
+@pytest.mark.parametrize(
+    ("name", "every"), full_but([("diver", 2), ("satellite", 5), ("cat_two_halves", 10)], ("cat_two_halves", 10))
+)
 def test_the_step_of_an_integrator_is_found_in_sparse_samples(name: str, every: int, rates: bool):
     run = without_step(name, seed=3, integrator="euler", step=0.002, every=every, duration=0.8)
     if not rates:
@@ -38,6 +41,7 @@ def test_the_step_of_an_integrator_is_found_in_sparse_samples(name: str, every: 
     assert found.cause[0].values["step"].value == pytest.approx(0.002, rel=0.02)
 
 
+@pytest.mark.full
 def test_a_stated_number_of_steps_has_to_be_that_of_the_drift():
     run = without_step("diver", seed=3, integrator="euler", step=0.002, every=4, duration=0.8)
     assert names(sp.audit(body_of("diver"), run, every=4)) == ["integration step"]
@@ -46,7 +50,7 @@ def test_a_stated_number_of_steps_has_to_be_that_of_the_drift():
         sp.audit(body_of("diver"), run, every=0)
 
 
-@pytest.mark.parametrize("velocity", ["angular", "linear"])
+@pytest.mark.parametrize("velocity", full_but(["angular", "linear"], "angular"))
 def test_a_wrong_frame_by_an_euler_integrator_is_two_causes(velocity: str):
     run = without_step("diver", seed=5, integrator="euler", step=0.004, every=3, duration=0.9)
     turned = Rotation.from_quat(run.quaternion)
@@ -58,6 +62,7 @@ def test_a_wrong_frame_by_an_euler_integrator_is_two_causes(velocity: str):
     assert [set(name.split(", and ")) for name in names(found)] == [{cause, "integration step"}], found.table()
 
 
+@pytest.mark.full
 def test_a_wrong_mass_by_an_euler_integrator_is_two_causes():
     run = without_step(
         "diver", seed=5, integrator="euler", step=0.004, every=3, duration=0.9, heavier={"left_arm": 1.5}
@@ -84,7 +89,7 @@ def recorded(seed: int, colour) -> sp.FloatingTrajectory:
     return noisy.part(30, 131)
 
 
-@pytest.mark.parametrize("memory", [0.5, 0.8, 0.95])
+@pytest.mark.parametrize("memory", full_but([0.5, 0.8, 0.95], 0.8))
 def test_noise_with_memory_raises_no_alarm(memory: float):
     def colour(noise: np.ndarray) -> np.ndarray:
         return np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], noise, axis=0)
@@ -94,6 +99,7 @@ def test_noise_with_memory_raises_no_alarm(memory: float):
         assert not found.wrong, found.table()
 
 
+@pytest.mark.full
 def test_filtered_samples_raise_no_alarm_or_are_named_with_their_cut_off():
     """In eleven of twelve: the powers of noise scatter, and once in a while they do not look like a filter's."""
     unexplained = 0
@@ -134,6 +140,7 @@ def test_states_held_between_steps_are_named_with_the_step(name: str, step: floa
     assert found.cause[0].values["step between states"].value == pytest.approx(step, rel=1e-6)
 
 
+@pytest.mark.full
 def test_another_cause_is_named_beside_held_states():
     step = sp.audit(body_of("diver"), held("diver", 0.002, 0.005, integrator="euler"))
     assert names(step) == ["integration step, and states held between steps of 2 ms"], step.table()
@@ -166,6 +173,7 @@ def test_samples_that_are_too_sparse_for_their_rates_are_not_called_right():
     assert found.wrong or "the samples hide changes of the momentum below" in found.verdict
 
 
+@pytest.mark.full
 def test_a_step_that_is_negative_is_not_named_beside_another_cause():
     """Euler backwards in time drifts as a negative step would."""
     run = without_step(

@@ -84,7 +84,7 @@ def test_a_flight_without_contact_is_audited_whole(name: str, seed: int):
 
 
 @pytest.mark.parametrize("name", full_but(["diver", "satellite"], "diver"))
-@pytest.mark.parametrize(("density", "viscosity"), [(1.2, 0.0), (0.0, 1.0), (5.0, 1.0)])
+@pytest.mark.parametrize(("density", "viscosity"), full_but([(1.2, 0.0), (0.0, 1.0), (5.0, 1.0)], (5.0, 1.0)))
 def test_a_fluid_of_mujoco_is_named_with_its_density_and_viscosity(name: str, density: float, viscosity: float):
     def fluid(model: mujoco.MjModel, _: mujoco.MjData) -> None:
         model.opt.density, model.opt.viscosity = density, viscosity
@@ -97,7 +97,7 @@ def test_a_fluid_of_mujoco_is_named_with_its_density_and_viscosity(name: str, de
     assert values.get("viscosity", 0.0) == pytest.approx(viscosity, rel=2e-3, abs=1e-3)
 
 
-@pytest.mark.parametrize("sensors", [None, SENSORS])
+@pytest.mark.parametrize("sensors", [pytest.param(None, marks=pytest.mark.full), SENSORS])
 def test_a_force_against_the_velocity_is_named_with_its_arm(sensors: dict[str, float] | None):
     """A quarter of the weight at 5 m/s, at a point beside the centre of mass, and a torque against the turn."""
     drag, turning, arm = 0.2, 0.001, np.array([0.02, 0.0, 0.01])
@@ -119,7 +119,7 @@ def test_a_force_against_the_velocity_is_named_with_its_arm(sensors: dict[str, f
         assert abs(fitted[label].value - truth) <= (off if sensors is None else 4.0 * fitted[label].bar)
 
 
-@pytest.mark.parametrize(("name", "joint"), [("diver", 1), ("cat", 3), ("satellite", 2)])
+@pytest.mark.parametrize(("name", "joint"), full_but([("diver", 1), ("cat", 3), ("satellite", 2)], ("satellite", 2)))
 def test_an_offset_of_a_joint_is_named_with_its_size(name: str, joint: int):
     body, run, offset = body_of(name), _flight(name), float(np.radians(2.0))
     run = replace(run, shapes=run.shapes + offset * np.eye(body.n_shape)[joint])
@@ -131,6 +131,7 @@ def test_an_offset_of_a_joint_is_named_with_its_size(name: str, joint: int):
     assert "+2 degrees" in found.cause[0].remark
 
 
+@pytest.mark.full
 def test_an_offset_within_noise_is_in_the_tie_with_its_bar():
     body = body_of("diver")
     motion = noisy(flown("diver", seed=1, step=0.001, every=5, duration=0.8), 1, **SENSORS)
@@ -153,7 +154,7 @@ def test_gravity_is_named_with_its_size(gravity: float, right: bool, sensors: di
         assert cause.values["tilt"].value < 0.2
 
 
-@pytest.mark.parametrize("gravity", [1.62, 3.7])
+@pytest.mark.parametrize("gravity", full_but([1.62, 3.7], 1.62))
 def test_weak_gravity_is_named_through_noise(gravity: float):
     """On the moon a body of 1 s falls through 0.8 m, which noise of millimetres does not hide."""
     for seed in range(3):
@@ -188,7 +189,7 @@ def _heavier(name: str, link: str, factor: float) -> mujoco.MjModel:
 @pytest.mark.parametrize(
     ("link", "part", "percent"),
     [
-        ("dish", "boom with dish (fixed)", 10.0 * 4.0 / 7.0),
+        pytest.param("dish", "boom with dish (fixed)", 10.0 * 4.0 / 7.0, marks=pytest.mark.full),
         ("left_panel_3", "left_panel_1 with left_panel_2, left_panel_3 (fixed)", 10.0 / 3.0),
     ],
 )

@@ -44,6 +44,7 @@ def test_faults_of_its_arguments_are_usage(capsys: pytest.CaptureFixture[str]):
     assert "one trajectory or more" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_page_says_what_was_audited_and_what_explains_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """MuJoCo's arrays of a body whose joint is read two degrees off, with their rates."""
     motion = flown("diver", seed=1, step=0.001, every=5, duration=0.4)
@@ -75,6 +76,7 @@ def test_a_page_of_what_cannot_be_a_page_is_usage(capsys: pytest.CaptureFixture[
     assert "must end in .html" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_the_steps_between_samples_are_stated(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """Every fourth step of MuJoCo's semi-implicit Euler: the step is the cause, with the size that MuJoCo took."""
     motion = flown("diver", seed=3, integrator="euler", step=0.002, every=4, duration=0.8)

@@ -64,6 +64,7 @@ def test_bars_of_a_recording_are_those_of_the_library(capfd, take):
     assert number == pytest.approx(np.degrees(found.montgomery_phase), abs=0.1 * bar + 1e-6)
 
 
+@pytest.mark.full
 def test_without_what_is_not_known_there_are_no_bars(capfd, take):
     text = said(capfd, "split", "diver", take, *MOMENTUM)
     assert "error bars" not in text
@@ -135,6 +136,7 @@ def test_a_noise_that_is_no_amount(capfd, take, noise):
     assert "joints" in capfd.readouterr().err
 
 
+@pytest.mark.full
 def test_a_smoothed_recording_has_the_bars_of_its_noise_and_says_what_smoothing_did(capfd, take):
     options = ("--smooth", "0.2deg", "--close", "1deg")
     data = json.loads(said(capfd, "split", "diver", take, *MOMENTUM, *options, "--json"))

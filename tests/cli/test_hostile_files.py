@@ -113,7 +113,7 @@ def damage(worker, folder, name, first, count):
     return loaded
 
 
-@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.full] * (name == "mjcf")) for name in BASES])
 def test_damaged_files(name, worker, tmp_path):
     count = QUICK_OF_AN_ENGINE if name == "mjcf" else QUICK // len(BASES)
     loaded = damage(worker, tmp_path, name, 0, count)

@@ -112,6 +112,7 @@ def test_everything_that_shows_a_split_shows_the_same_numbers(number, capfd, tmp
         assert shown["Closing arc"][0] == f"{table['by the closing'].split()[0]}°" == f"{np.degrees(added):.6f}°"
 
 
+@pytest.mark.full
 def test_a_report_says_what_it_was_made_of(capfd, tmp_path, monkeypatch):
     """Command, versions, date, files with their hashes, joints and masses, what smoothing did, and error bars."""
     monkeypatch.setattr(report_page, "FIGURES", {"inertia": report_page.FIGURES["inertia"]})

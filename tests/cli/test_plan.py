@@ -135,6 +135,7 @@ def test_postures_lists_and_mirrors(tmp_path, capsys):
     assert data["miss_rad"] < 1e-8
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_limits_hold_and_are_told(tmp_path, capsys):
     """Second and third differences of the file's shapes, between which they do not change much."""
@@ -152,6 +153,7 @@ def test_limits_hold_and_are_told(tmp_path, capsys):
     assert (data["cost_name"], data["cost_unit"]) == ("effort", "s")
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_a_time_limit_ends_the_search_with_the_best_so_far(tmp_path, capsys):
     """The time is over after the first iteration, with a file that says so and is read all the same."""

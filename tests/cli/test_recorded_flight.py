@@ -32,7 +32,8 @@ def answer(capsys, *arguments):
     return json.loads(capsys.readouterr().out)
 
 
-@pytest.mark.parametrize("with_report", [False, pytest.param(True, marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize("with_report", [False, True])
 def test_one_command_goes_from_the_take_to_the_split(with_report, take, tmp_path, capsys):
     """Momentum and attitude lie within five bars, which are as wide as the noise says; nothing of the push is in it."""
     report = ["--html", tmp_path / "r.html"] if with_report else []
@@ -151,7 +152,9 @@ def flight_file(tmp_path_factory):
 GIVEN, START = np.array([4.0, 60.0, 6.0]), Rotation.from_rotvec([0.3, -0.5, 0.8]).as_quat()
 
 
-@pytest.mark.parametrize("options", [(), ("--momentum", "4", "60", "6"), ("--flight", "all")])
+@pytest.mark.parametrize(
+    "options", [pytest.param((), marks=pytest.mark.full), ("--momentum", "4", "60", "6"), ("--flight", "all")]
+)
 def test_a_recorded_base_is_used_in_silence_by_nobody(options, flight_file, capsys):
     """The attitude at the end is SciPy's; with a momentum that is given, the motion starts as recorded."""
     file, end = flight_file
@@ -181,6 +184,7 @@ def test_without_a_base_zero_is_said(flight_file, tmp_path, capsys):
     )
 
 
+@pytest.mark.full
 def test_a_base_that_no_momentum_turns_is_an_error_that_names_the_ways_out(tmp_path, capsys):
     """The rate of a rigid body doubles: no free flight."""
     times = np.linspace(0.0, 0.8, 41)

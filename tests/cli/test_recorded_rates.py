@@ -73,6 +73,7 @@ def test_a_gyro_and_a_star_tracker(columns, tmp_path, capsys):
         assert words in text, words
 
 
+@pytest.mark.full
 def test_a_star_tracker_alone_is_asked_for_its_direction(columns, tmp_path, capsys):
     file = log(tmp_path / "m.csv", columns, (SIGMA, columns["sigma"]))
     assert square(split(capsys, file, "--base-inverse")) < chi2.ppf(1.0 - 1e-6, 3)
@@ -84,6 +85,7 @@ def test_a_star_tracker_alone_is_asked_for_its_direction(columns, tmp_path, caps
     assert "sigma_3: base axes to the recorder's, --base-inverse for the inverse" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_a_gyro_alone_starts_at_a_given_attitude(columns, tmp_path, capsys):
     file = log(tmp_path / "m.csv", columns, (GYRO, np.degrees(columns["rates"])))
     start = Rotation.from_matrix(simulated()[1].attitude[0]).as_quat()
@@ -95,6 +97,7 @@ def test_a_gyro_alone_starts_at_a_given_attitude(columns, tmp_path, capsys):
     assert "to the recorded base    51 rates with " in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_a_rate_at_a_time_states_the_momentum(columns, tmp_path, capsys):
     """The simulator's own rate, in degrees; also in place of a fit to the recorded base."""
     times, motion = simulated()

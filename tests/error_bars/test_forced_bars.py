@@ -112,9 +112,8 @@ def moved_inputs(
 
 _ALL = ("momentum", "attitude", "start", "joints", "inertias")
 _QUICK = [
-    *(("diver", "body", name) for name in ("momentum", "attitude", "joints", "inertias")),
+    ("diver", "body", "inertias"),
     ("diver", "space", "joints"),
-    ("wheels", "body", "gyro"),
 ]
 
 

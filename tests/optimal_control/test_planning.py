@@ -544,6 +544,7 @@ def test_a_search_stopped_among_its_guesses_keeps_one():
     assert so3.angle(stopped.value.best.motion.final_attitude.T @ goal) < 1e-8
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_a_search_stopped_after_a_start_has_its_plan():
     body = sp.load_body("cat_two_halves")

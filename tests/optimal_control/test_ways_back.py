@@ -11,6 +11,7 @@ from shapephase import so3
 from shapephase.errors import PlanNotFound, ShapeError, WrongObjectError
 from shapephase.optimal_control import Limits, Search, undo
 from support.independent import apart, random_rotation
+from support.long_runs import full_but
 
 COARSE = Search(pieces=12)
 
@@ -35,7 +36,7 @@ def satisfied(row) -> None:
 
 
 @pytest.mark.usefixtures("few_guesses")
-@pytest.mark.parametrize("number", [0, 4, 5])
+@pytest.mark.parametrize("number", full_but([0, 4, 5], 5))
 def test_drifts_of_satellites_are_taken_back(number):
     satisfied(taken_back(number, pieces=10))
 
@@ -80,6 +81,7 @@ def test_played_backwards_at_any_pace():
         assert ways.backwards.path.duration == factor * motion.duration
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_limits_that_the_motion_exceeds_are_kept_by_the_plan():
     motion = swung(share=1.5)
@@ -108,6 +110,7 @@ def test_with_momentum_a_plan_undoes_at_a_given_time():
     assert apart(again.final_attitude, motion.initial_attitude) < 1e-8
 
 
+@pytest.mark.full
 def test_a_search_without_result_leaves_playing_backwards():
     """Stopped at once, without momentum; with too little room for it, nothing is left."""
     ways = undo(swung(), search=COARSE, progress=lambda *_: True)

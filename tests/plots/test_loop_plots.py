@@ -83,6 +83,7 @@ def test_the_flux_in_the_plane_is_the_integral_of_the_curvature_over_the_disc(ha
     assert flux.of_cone == pytest.approx(flux.in_plane, abs=1e-12)
 
 
+@pytest.mark.full
 def test_the_flux_of_the_cone_is_the_integral_over_its_surface(satellite):
     """By the whole curvature tensor at every point of the cone, for all ten joints and for two and three of them."""
     path = satellite_sweep().matched(satellite.joint_names, satellite.name)
@@ -113,6 +114,7 @@ def test_small_loops_turn_the_body_by_their_flux(halves):
     assert off[0] > 1.9 * off[1] > 3.6 * off[2] > 0.0
 
 
+@pytest.mark.full
 def test_whole_turns_are_added_to_the_turn(cat):
     """Two rounds of the cat's righting: 360 degrees, not none."""
     path = cat_righting()

@@ -115,6 +115,7 @@ def test_a_report_shows_each_figure_once(moving_report):
     assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2, 3]
 
 
+@pytest.mark.full
 def test_a_report_has_the_loop_of_a_path_that_closes(tmp_path):
     body = sp.load_body("cat_two_halves")
     opened_path = sp.ShapePath.waypoints([0.0, 1.0], [[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]], joint_names=body.joint_names)
@@ -320,6 +321,7 @@ def test_rotation_vectors_go_on_through_half_a_turn():
     np.testing.assert_allclose(found, angles[:, None] * axis, atol=1e-12)
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("no_pictures")
 def test_no_zero_of_a_report_has_a_sign(tmp_path):
     """Joints that tremble by less than what is shown, and a phase that is rounding."""

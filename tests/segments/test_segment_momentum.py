@@ -223,6 +223,7 @@ def test_a_push_from_outside_is_seen_and_its_size_is_right():
     np.testing.assert_allclose(exact.whole, truth, rtol=0, atol=1e-10 * np.abs(truth).max())
 
 
+@pytest.mark.full
 def test_without_a_push_noise_is_no_drift_and_bars_hold_against_draws():
     motion, truth = pushed(0.0, 10)
     body, pulls, drifts = body_of("cat"), [], []

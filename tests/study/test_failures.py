@@ -21,6 +21,7 @@ from shapephase.cli.outcome import ExitCode
 from shapephase.errors import StudyError, UnknownNameError
 from shapephase.study import dask_client
 from shapephase.study._workers import recipe_of
+from support.long_runs import full_but
 from support.mortal_process import started
 from support.places import ROOT
 from support.study_functions import POISON, orphaning
@@ -81,6 +82,7 @@ def test_only_failed_cases_can_be_computed_again(tmp_path):
         room.Study(RIGID).run(tmp_path / "out.zarr", retry="failed")
 
 
+@pytest.mark.full
 def test_a_process_that_is_gone_is_seen_though_its_child_lives(tmp_path, monkeypatch):
     """And the child does not live to the end of its five seconds, after which it would write a file."""
     monkeypatch.setenv("STUDY_LOG", str(tmp_path / "log"))
@@ -92,7 +94,7 @@ def test_a_process_that_is_gone_is_seen_though_its_child_lives(tmp_path, monkeyp
     assert store.errors() == [(1, "ProcessDied", "its process ended with code 3")]
 
 
-@pytest.mark.parametrize("limit", [43200.0, 1e300])
+@pytest.mark.parametrize("limit", full_but([43200.0, 1e300], 1e300))
 def test_a_long_time_limit_is_one(tmp_path, limit):
     study = room.Study(RIGID, over={"momentum": room.Directions(1.0)}, draws=1000, chunk=1000, time_limit=limit)
     assert study.run(tmp_path / "out.zarr", workers=1).counts()["done"] == 1000

@@ -52,7 +52,7 @@ def shortest_of_shots(metric, attitude, count, seed):
         ((3.0, 2.0, 1.0), (0.3, -0.5, 0.2)),
         ((3.0, 2.0, 1.0), (1.7, 1.2, -1.9)),
         ((1.0, 2.5, 1.7), (-0.4, 2.0, 1.0)),
-        ((np.inf, 2.0, 1.0), (0.6, 0.4, -0.8)),
+        pytest.param((np.inf, 2.0, 1.0), (0.6, 0.4, -0.8), marks=pytest.mark.full),
     ],
     ids=str,
 )
