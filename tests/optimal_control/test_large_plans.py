@@ -139,6 +139,7 @@ def test_back_from_a_path_beside_it(two_halves, skew, seed):
     assert np.abs(found.shape(times) - motion.shape(times)).max() < 1e-7
 
 
+@pytest.mark.full
 def test_a_field_that_overflows_is_reported_without_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
