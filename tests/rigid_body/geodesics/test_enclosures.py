@@ -11,8 +11,6 @@ from scipy.spatial.transform import Rotation
 from shapephase import so3
 from shapephase.errors import ShapeError
 from shapephase.rigid_body.geodesics import (
-    _arrival_search,
-    _momentum_cover,
     axisymmetric_metric,
     cut_time_enclosure,
     distance,
@@ -24,7 +22,6 @@ from shapephase.rigid_body.geodesics import (
 )
 
 NEARLY = 1e-9  # by which moments differ that are equal in the closed form: distances then differ by half of it
-ROUNDING = 1e-10
 
 
 def shortest_of_shots(metric, attitude, count, seed):
@@ -125,45 +122,6 @@ def test_small_turns_about_the_forbidden_axis_are_loops(turn):
     expected = np.sqrt(4.0 * np.pi * turn * np.sqrt(2.0))
     assert found.certified
     assert found.lower < expected < found.upper * (1.0 + turn)
-
-
-@pytest.mark.parametrize("inverse_moments", [(1.0, 0.5, 0.3), (1.0, 0.9, 0.0), (2.0, 0.4, 0.35)], ids=str)
-def test_random_pairs_of_momenta_part_by_no_more_than_their_cell_says(inverse_moments):
-    """The angle between their attitudes, and what is left of it beside the derivative; bounds are near the largest."""
-    inverse, rng, duration = np.array(inverse_moments), np.random.default_rng(4), 3.0
-    metric = left_invariant_metric([np.inf if a == 0.0 else 1.0 / a for a in inverse])
-    cover = _arrival_search.momentum_cover(inverse, duration, _arrival_search.largest_axial(inverse, 0.5 * duration))
-    count, size = 20, 40
-    ones = np.ones(size)
-    cells = _momentum_cover.Cells(
-        azimuth=rng.uniform(0.0, 2.0 * np.pi, size),
-        height=rng.uniform(-1.0, 1.0, size),
-        half_azimuth=0.03 * ones,
-        half_height=0.03 * ones,
-        time=0.0 * ones,
-        ancestor=np.arange(size),
-    )
-    bounds = _momentum_cover.flow_bounds(cover, cells, count)
-    assert bounds.closed.all()
-    used = []
-    for _ in range(25):
-        moved = [rng.uniform(-1.0, 1.0, (2, size)) * 0.03 for _ in range(2)]
-        pair = [cover.chart(cells.azimuth + a, cells.height + h)[0] for a, h in moved]
-        distances = np.linalg.norm(pair[1] - pair[0], axis=-1)
-        row = int(rng.integers(1, count + 1))
-        time = row * bounds.step
-        first, second = (metric.axes @ (n * cover.units).T for n in pair)
-        ends = [metric.attitude(start.T, time) for start in (first, second)]
-        change = so3.transpose(ends[0]) @ ends[1]
-        turned = so3.log(change)
-        straight = np.einsum("nij,nj->ni", metric.differential(first.T, time), (second - first).T)
-        growth, bend = bounds.at(cells.ancestor, np.full(size, time))
-        assert np.all(np.linalg.norm(turned, axis=-1) <= growth * distances + ROUNDING)
-        rest = np.linalg.norm(turned - straight, axis=-1)
-        bound = (bend + 0.25 * 1.05 * growth**2) * distances**2
-        assert np.all(rest <= bound + ROUNDING)
-        used.append((rest / bound).max())
-    assert max(used) > 0.02
 
 
 def test_a_longer_way_in_place_of_the_shortest_is_not_certified(monkeypatch):

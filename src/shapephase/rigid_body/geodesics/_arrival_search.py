@@ -94,7 +94,7 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class _Progress:
+class Progress:
     """Bounds for N cells at their times."""
 
     length: Array
@@ -105,7 +105,7 @@ class _Progress:
     """(N,) True where halving the azimuth makes the deviation smaller."""
 
 
-def _progress(cover: MomentumCover, bounds: FlowBounds, cells: Cells, goal: Goal) -> _Progress:
+def progress(cover: MomentumCover, bounds: FlowBounds, cells: Cells, goal: Goal) -> Progress:
     """How far the cells' geodesics still are from the goal."""
     a = cover.inverse_moments
     n, wide, high = cover.chart(cells.azimuth, cells.height)
@@ -147,21 +147,21 @@ def _progress(cover: MomentumCover, bounds: FlowBounds, cells: Cells, goal: Goal
         # The momentum's part of the rest is horizontal but for the turn since.
         rest = (curving * np.minimum(1.0, cells.time / shortest) + turned) * radius**2 + slack
         upwards = np.abs(sides[0][:, 2]) + np.abs(sides[1][:, 2]) + np.linalg.norm(z[:, 2], axis=-1) * bend + rest
-        ahead = np.maximum(ahead, _climb(a, np.abs(xi[:, 2]), upwards, deviation))
-        at_centre = np.maximum(at_centre, _climb(a, np.abs(xi[:, 2]), np.zeros_like(angle), np.zeros_like(angle)))
+        ahead = np.maximum(ahead, least_climb(a, np.abs(xi[:, 2]), upwards, deviation))
+        at_centre = np.maximum(at_centre, least_climb(a, np.abs(xi[:, 2]), np.zeros_like(angle), np.zeros_like(angle)))
     widths = cells.half_azimuth * np.linalg.norm(wide, axis=-1), cells.half_height * np.linalg.norm(high, axis=-1)
     effects = [
         np.linalg.norm(side, axis=-1) + (curving + turned) * radius * width
         for side, width in zip(sides, widths, strict=True)
     ]
-    return _Progress(
+    return Progress(
         length=np.maximum(ahead, 0.0) * (1.0 - SLACK),
         at_centre=at_centre,
         across=effects[0] > effects[1],
     )
 
 
-def _climb(inverse_moments: Array, height: Array, upwards: Array, deviation: Array) -> Array:
+def least_climb(inverse_moments: Array, height: Array, upwards: Array, deviation: Array) -> Array:
     """Length of a curve that turns by `height` about the forbidden axis, less up to `upwards` at its start.
 
     Half a circle sweeps the greatest area; the other terms are of third order, or due to the start's deviation.
@@ -239,7 +239,7 @@ def first_arrival(
         order = np.argsort(cells.time, kind="stable")
         block, cells = cells[order[:_BLOCK]], cells[order[_BLOCK:]]
         work += len(block)
-        ahead = _progress(cover, bounds, block, goal)
+        ahead = progress(cover, bounds, block, goal)
         block = replace(block, time=block.time + ahead.length)
         left = ~(block.time >= stop)
         if arrival is not None:
