@@ -78,7 +78,7 @@ def momenta_within(rng, cover, cells):
 
 @pytest.mark.parametrize("number", ALONE)
 def test_extremals_of_a_cell_part_by_no_more_than_its_bounds(number):
-    """The angle at once, and what is left of it beside the derivative. Bounds are up to 1.4, 8 and 15 times too large."""
+    """The angle at once, and what is left beside the derivative: bounds are up to 1.4, 8 and 15 times too large."""
     rng = np.random.default_rng(number)
     inverse = inverse_moments_of(rng, 8.0, number)
     duration = rng.uniform(0.3, 1.5) * np.pi / np.sqrt(inverse[0])
