@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from shapephase import so3
@@ -140,6 +141,36 @@ def test_a_longer_way_in_place_of_the_shortest_is_not_certified(monkeypatch):
     found = distance_enclosure(metric, attitude, most_cells=30_000)
     assert not found.certified
     assert found.lower <= true.length < found.upper == pytest.approx(time, abs=1e-6)
+
+
+@pytest.mark.full
+def test_a_thin_tube_of_momenta_that_many_shots_miss(monkeypatch):
+    """A stiff axis: about 1e-5 of all directions begin the loop that turns about it in less than the straight turn."""
+    metric, turn = left_invariant_metric([1.0, 1.3, 1e5]), np.array([0.0, 0.0, 2e-4])
+    attitude, roots = so3.exp(turn), np.sqrt(metric.moments)
+    straight = float(roots[2] * turn[2])
+    rng = np.random.default_rng(3)
+    starts = metric.unit_speed(rng.normal(size=(20_000, 3)))
+    times = straight * rng.uniform(0.0, 1.1, 20_000)
+
+    def missed(momentum):
+        return so3.log(so3.transpose(metric.attitude(momentum)) @ attitude) @ metric.axes * roots
+
+    def slope(momentum):
+        return -roots[:, None] * (metric.axes.T @ metric.differential(momentum))
+
+    near = np.argsort(times + np.linalg.norm(missed(starts * times[:, None]), axis=-1))[:50]
+    polished = [least_squares(missed, starts[i] * times[i], slope, x_scale="jac", xtol=1e-14, ftol=1e-14) for i in near]
+    lengths = [metric.speed(fit.x) for fit in polished if np.linalg.norm(fit.fun) < 1e-3 * straight]
+    assert min(lengths) == pytest.approx(straight, rel=1e-3)
+    found = distance_enclosure(metric, attitude, width=2e-2)
+    assert found.certified
+    assert found.upper < 0.8 * straight
+    longer = replace(shortest_geodesic(metric, attitude), momentum=metric.moments * turn, length=straight)
+    monkeypatch.setattr(enclosures, "found_geodesic", lambda *_: longer)
+    planted = distance_enclosure(metric, attitude, width=2e-2)
+    assert not planted.certified
+    assert planted.lower <= found.upper < planted.upper
 
 
 @pytest.mark.parametrize(("equatorial", "axial"), [(1.0, 2.5), pytest.param(1.0, 0.4, marks=pytest.mark.full)])
