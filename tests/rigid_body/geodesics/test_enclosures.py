@@ -12,8 +12,10 @@ from scipy.spatial.transform import Rotation
 from shapephase import so3
 from shapephase.errors import ShapeError
 from shapephase.rigid_body.geodesics import (
+    _symmetric_arrivals,
     axisymmetric_metric,
     cut_time_enclosure,
+    diameter_enclosure,
     distance,
     distance_enclosure,
     distance_enclosure_on_su2,
@@ -197,6 +199,98 @@ def test_half_a_turn_about_a_principal_axis_is_where_both_senses_meet():
     assert cut_time_enclosure(metric, [0.0, 4.0, 0.0]).upper == pytest.approx(0.5 * found.upper, rel=1e-9)
 
 
+@pytest.mark.parametrize(("equatorial", "axial"), [(1.0, 1.5), (1.0, 3.0), (1.0, 0.4), (1.0, np.inf)])
+def test_diameters_of_axisymmetric_metrics_are_those_of_the_closed_form(equatorial, axial):
+    """But for rounding, and the farthest attitude is half a turn about an axis of the largest moment."""
+    found = diameter_enclosure(left_invariant_metric([equatorial, equatorial, axial]))
+    expected = axisymmetric_metric(equatorial, axial).diameter
+    assert found.certified
+    assert found.lower <= expected == pytest.approx(found.upper, rel=1e-12)
+    assert found.width <= 1e-8 * expected
+
+
+@pytest.mark.parametrize(
+    ("equatorial", "axial"),
+    [
+        (1.0, 1.5),
+        pytest.param(1.0, 0.4, marks=pytest.mark.full),
+        pytest.param(1.0, 3.0, marks=pytest.mark.full),
+        pytest.param(1.0, np.inf, marks=pytest.mark.full),
+    ],
+)
+def test_nearly_axisymmetric_diameters_hold_the_closed_form(monkeypatch, equatorial, axial):
+    """The search for symmetric arrivals has to be made, as if no axisymmetric metric bounded the diameter."""
+    monkeypatch.setattr(enclosures, "_axial_diameter", lambda _: np.inf)
+    found = diameter_enclosure(left_invariant_metric([equatorial, equatorial * (1.0 + NEARLY), axial]))
+    expected = axisymmetric_metric(equatorial, axial).diameter
+    assert found.certified
+    assert found.cells > 0
+    assert found.lower <= expected * (1.0 + NEARLY)
+    assert found.upper >= expected * (1.0 - NEARLY)
+
+
+DIAMETERS = [
+    (1.0, 2.0, 3.0),
+    (2.0, 1.0, 2.6),
+    (1.0, 1.6, 2.5),
+    (1.0, 1.2, 4.0),
+    (0.8, 1.0, 3.0),
+    (1.0, 1.3, 3.5),
+    (1.0, 1.1, 8.0),
+    (1.0, 1.05, np.inf),
+    (1.2, np.inf, 1.0),
+    (1.0, 1.5, np.inf),
+]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("moments", DIAMETERS, ids=str)
+def test_ten_diameters_within_two_per_cent(moments):
+    """Of random attitudes none is further than the upper bound, nor are diameters of smaller metrics."""
+    metric = left_invariant_metric(moments)
+    found = diameter_enclosure(metric, most_cells=2_000_000)
+    assert found.certified
+    assert found.width <= 2e-2 * found.upper
+    smallest, middle, largest = metric.moments
+    assert found.upper >= axisymmetric_metric(smallest, largest).diameter
+    assert found.upper >= axisymmetric_metric(middle, smallest).diameter
+    attitudes = Rotation.random(30, rng=np.random.default_rng(7)).as_matrix()
+    assert max(shortest_geodesic(metric, attitude).length for attitude in attitudes) <= found.upper
+    np.testing.assert_allclose(
+        metric.attitude(found.momentum), so3.exp(np.pi * metric.axes[:, 2]), rtol=0.0, atol=1e-10
+    )
+
+
+@pytest.mark.parametrize(
+    "moments", [(1.0, 1.3, 3.5), (1.0, 1.1, 8.0), pytest.param((1.0, 1.05, np.inf), marks=pytest.mark.full)]
+)
+def test_before_the_diameter_not_all_geodesics_have_met_a_symmetric_one(moments):
+    metric = left_invariant_metric(moments)
+    time = 0.99 * shortest_geodesic(metric, so3.exp(np.pi * metric.axes[:, 2])).length
+    met, work = _symmetric_arrivals.all_met(metric.inverse_moments, time, 0.0, 50_000)
+    assert not met
+    assert work >= 50_000
+
+
+@pytest.mark.parametrize("moments", [(1.0, 1.3, 3.5), (2.5, 1.0, 1.7), (1.0, 2.0, np.inf)], ids=str)
+def test_a_geodesic_that_has_met_a_symmetric_one_is_not_the_shortest(moments):
+    """Signs of the quaternion's components show it, but for those that are 0 because the momentum's is 0 midway."""
+    metric = left_invariant_metric(moments)
+    times = np.linspace(0.0, 1.1 * shortest_geodesic(metric, so3.exp(np.pi * metric.axes[:, 2])).length, 80)
+    for start in metric.unit_speed(np.random.default_rng(8).normal(size=(3, 3))):
+        quats = so3.quat_from_matrix(metric.axes.T @ metric.attitude(start, times) @ metric.axes)
+        quats[1:] *= np.cumprod(np.sign(np.sum(quats[1:] * quats[:-1], axis=-1)))[:, None]
+        midway = metric.body_momentum(start, 0.5 * times) @ metric.axes
+        signs = np.column_stack([quats[:, 3], quats[:, :2] * midway[:, :2]])
+        first = int(np.argmax(np.any(signs < -1e-3, axis=-1)))
+        assert first > 0
+        assert shortest_geodesic(metric, metric.attitude(start, times[first])).length < times[first] - 1e-6
+    for axis in range(3):
+        middle = metric.unit_speed(metric.axes @ np.where(np.arange(3) == axis, 0.0, [0.7, -0.5, 0.9]))
+        start = metric.body_momentum(middle, -1.5)
+        assert abs(so3.log(metric.attitude(start, 3.0)) @ metric.axes[:, axis]) < 1e-12
+
+
 def test_too_little_work_leaves_the_bounds_of_axisymmetric_metrics():
     metric, attitude = left_invariant_metric([1.0, 2.0, 3.0]), so3.exp(np.array([1.7, 1.2, -1.9]))
     found, bounds = distance_enclosure(metric, attitude, most_cells=1), shortest_geodesic(metric, attitude)
@@ -204,6 +298,9 @@ def test_too_little_work_leaves_the_bounds_of_axisymmetric_metrics():
     assert found.lower == pytest.approx(bounds.lower_bound, rel=1e-8)
     assert not cut_time_enclosure(metric, [1.0, 1.0, 1.0], most_cells=1).certified
     assert distance_enclosure(metric, np.eye(3)).upper == 0.0
+    largest = diameter_enclosure(left_invariant_metric([1.0, 1.3, 3.5]), most_cells=1)
+    assert not largest.certified
+    assert largest.upper == axisymmetric_metric(1.3, 3.5).diameter
 
 
 def test_an_end_that_is_met_to_the_last_digit_has_no_gap():
