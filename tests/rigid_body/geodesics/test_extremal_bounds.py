@@ -1,7 +1,7 @@
 """Bounds that the enclosures rest on, against extremals and their variational equation integrated by DOP853.
 
-How far extremals of a cell of momenta part, how far they still are from their goal, how much a curve turns about a
-forbidden axis, and with which momenta no extremal is the shortest.
+How far extremals of a cell of momenta part, how far they still are from their goal, when all have met a symmetric one,
+how much a curve turns about a forbidden axis, and with which momenta no extremal is the shortest.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from shapephase import so3
-from shapephase.rigid_body.geodesics import _arrival_search, _momentum_cover, axisymmetric_metric
+from shapephase.rigid_body.geodesics import _arrival_search, _momentum_cover, _symmetric_arrivals, axisymmetric_metric
 
 ROUNDING = 1e-9  # of DOP853
 ALONE = [pytest.param(number, marks=pytest.mark.full if number >= 4 else ()) for number in range(60)]
@@ -134,6 +134,37 @@ def test_no_extremal_of_a_cell_is_nearer_to_the_goal_than_its_bound(number):
         assert length <= left + ROUNDING
         used.append(length / left)
     assert max(used) > 0.7
+
+
+@pytest.mark.parametrize("number", ALONE[:12])
+def test_all_extremals_of_a_cell_have_met_a_symmetric_one_if_its_bounds_say_so(monkeypatch, number):
+    """By the signs at one instant. Cells are as large as the bounds allow, to 5 %, most momenta at their corners."""
+    monkeypatch.setattr(_symmetric_arrivals, "INSTANTS", 1)
+    rng = np.random.default_rng(number)
+    inverse = inverse_moments_of(rng, 4.0, number)
+    time = rng.uniform(0.85, 1.0) * np.pi / np.sqrt(max(inverse[2], inverse[1] / 3.0))
+    cover = _arrival_search.momentum_cover(inverse, time, _arrival_search.largest_axial(inverse, 0.5 * time))
+    cells = replace(random_cells(rng, cover, 200), half_azimuth=np.full(200, 0.04), half_height=np.full(200, 0.04))
+    bounds = _momentum_cover.flow_bounds(cover, cells, 24)
+    met = np.zeros(200, dtype=bool)
+    for _ in range(40):
+        met |= _symmetric_arrivals.have_met(cover, bounds, cells)
+        smaller = np.where(met, 1.0, 0.95)
+        cells = replace(cells, half_azimuth=smaller * cells.half_azimuth, half_height=smaller * cells.half_height)
+    met &= cells.half_azimuth < 0.04
+    assert met.any()
+    cells = cells[met]
+    momenta = [
+        cover.chart(cells.azimuth + i * cells.half_azimuth, cells.height + j * cells.half_height)[0]
+        for i, j in ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0))
+    ]
+    starts = np.concatenate([*momenta, momenta_within(rng, cover, cells)])[None] * cover.units
+    momentum, attitudes, _, _ = extremals(inverse, starts, np.linspace(0.0, time, 41))
+    quats = so3.quat_from_matrix(attitudes[:, 0])
+    # Of the two quaternions the one that is continued from 1.
+    end = quats[-1] * np.prod(np.sign(np.sum(quats[1:] * quats[:-1], axis=-1, keepdims=True)), axis=0)
+    signs = np.concatenate([end[:, 3:], end[:, :2] * momentum[20, 0, :, :2]], axis=-1)
+    assert np.all(np.any(signs < ROUNDING, axis=-1))
 
 
 @pytest.mark.parametrize("number", [pytest.param(n, marks=pytest.mark.full if n >= 2 else ()) for n in range(30)])

@@ -20,7 +20,7 @@ from ._arrival_search import NEAR, cell_ends, largest_axial, momentum_cover
 from ._momentum_cover import SLACK, TABLE_COST, Cells, FlowBounds, MomentumCover, coarse_cells
 from ._momentum_flow import momentum_flow, quaternion_flow
 
-_INSTANTS = 32  # up to the time, at which the signs are taken
+INSTANTS = 32  # up to the time, at which the signs are taken
 _WORTH = 0.05  # of the deviation's bound, below which a value cannot decide once its linear part is exact
 _COST = 10  # evaluations of an attitude that a cell takes
 _BLOCK = 1000  # cells at once
@@ -46,7 +46,7 @@ def all_met(inverse_moments: Array, time: float, about_third: float, most: int) 
     while len(cells) and work < most:
         block, cells = cells[:_BLOCK], cells[_BLOCK:]
         work += _COST * len(block)
-        met = _met(cover, bounds, block)
+        met = have_met(cover, bounds, block)
         polar = np.flatnonzero(at_pole[block.ancestor])
         n, _, _ = cover.chart(block.azimuth[polar], block.height[polar])
         apart = np.linalg.norm(n - [0.0, 0.0, cover.elongation], axis=-1) + cover.radius(block[polar])
@@ -58,13 +58,13 @@ def all_met(inverse_moments: Array, time: float, about_third: float, most: int) 
     return not len(cells), work
 
 
-def _met(cover: MomentumCover, bounds: FlowBounds, cells: Cells) -> Mask:
+def have_met(cover: MomentumCover, bounds: FlowBounds, cells: Cells) -> Mask:
     """True for cells of which all geodesics have met a symmetric one by one of the instants."""
     a, count = cover.inverse_moments, len(cells)
-    times = cover.duration * np.arange(1, _INSTANTS + 1) / _INSTANTS
-    instants, ancestors = np.tile(times, count), np.repeat(cells.ancestor, _INSTANTS)
-    radius = np.repeat(cover.radius(cells), _INSTANTS)
-    starts = np.repeat(cover.chart(cells.azimuth, cells.height)[0] * cover.units, _INSTANTS, axis=0)
+    times = cover.duration * np.arange(1, INSTANTS + 1) / INSTANTS
+    instants, ancestors = np.tile(times, count), np.repeat(cells.ancestor, INSTANTS)
+    radius = np.repeat(cover.radius(cells), INSTANTS)
+    starts = np.repeat(cover.chart(cells.azimuth, cells.height)[0] * cover.units, INSTANTS, axis=0)
     quats = quaternion_flow(a, starts, instants)
     midway = momentum_flow(a, starts, 0.5 * instants)[0][:, :2]
     moved = bounds.momentum_growth(ancestors, 0.5 * instants) * radius
@@ -72,12 +72,12 @@ def _met(cover: MomentumCover, bounds: FlowBounds, cells: Cells) -> Mask:
     components = [3, 0, 1]
     signs = np.concatenate([np.ones((len(starts), 1)), np.where(known, np.sign(midway), 0.0)], axis=-1)
     angle = bounds.at(ancestors, instants)[0] * radius
-    shares = (-signs * quats[:, components] / (0.5 * angle[:, None])).reshape(count, _INSTANTS, 3)
+    shares = (-signs * quats[:, components] / (0.5 * angle[:, None])).reshape(count, INSTANTS, 3)
     met = np.zeros(count, dtype=bool)
     for column, component in enumerate(components):
         best = np.argmax(shares[..., column], axis=1)
         rows = np.flatnonzero(~met & (shares[np.arange(count), best, column] > _WORTH))
-        chosen = rows * _INSTANTS + best[rows]
+        chosen = rows * INSTANTS + best[rows]
         block = replace(cells[rows], time=instants[chosen])
         ends = cell_ends(cover, bounds, block)
         vector, scalar = ends.quats[:, :3], ends.quats[:, 3]
