@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ... import so3
-from ...arrays import Array
+from ...arrays import Array, Mask
 from ._momentum_cover import (
     SLACK,
     TABLE_COST,
@@ -101,7 +101,7 @@ class Progress:
     """(N,) below which no curve from any of the cell's geodesics comes to the attitude."""
     at_centre: Array
     """(N,) the bound of the centre's geodesic alone."""
-    across: Array
+    across: Mask
     """(N,) True where halving the azimuth makes the deviation smaller."""
 
 

@@ -59,7 +59,7 @@ class Cells:
         columns = {f.name: np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)}
         return replace(self, **columns)
 
-    def halved(self, across: Array) -> Self:
+    def halved(self, across: Mask) -> Self:
         """Two halves of each, cut across the azimuth where `across` holds, else across the height."""
         wide, high = np.where(across, 0.5, 1.0) * self.half_azimuth, np.where(across, 1.0, 0.5) * self.half_height
         to_side, up = self.half_azimuth - wide, self.half_height - high
@@ -255,7 +255,7 @@ def coarse_cells(cover: MomentumCover, highest: float, most: int) -> tuple[Cells
         ancestor=np.zeros(azimuth.size, dtype=np.int64),
     )
     cells, tables, computed = open_cells[:0], [], 0
-    while len(open_cells) and computed <= most:
+    while True:
         block, open_cells = open_cells[:_BLOCK], open_cells[_BLOCK:]
         computed += len(block)
         bounds = flow_bounds(cover, block, count)
@@ -264,6 +264,8 @@ def coarse_cells(cover: MomentumCover, highest: float, most: int) -> tuple[Cells
         loose = block[~bounds.closed]
         wide, high = cover.widths(loose)
         open_cells = open_cells.joined(loose.halved(wide > high))
+        if not len(open_cells) or computed > most:
+            break
     if len(open_cells):
         cells = cells[:0]
     growth, bend, rate = (np.concatenate(columns) for columns in zip(*tables, strict=True))
