@@ -125,8 +125,9 @@ class CellEnds:
     """(N,) of the rotation vectors, at most."""
     curving: Array
     turned: Array
-    """(N,) of the rest of second order: from the momentum's flow, and from turns that do not commute."""
+    """(N,) `curving` and `turned`: rest per |q|², from the momentum's flow and from turns that do not commute."""
     slack: Array
+    """(N,) above the rounding errors of an angle."""
 
     @property
     def rest(self) -> Array:

@@ -42,7 +42,7 @@ def all_met(inverse_moments: Array, time: float, about_third: float, most: int) 
         return False, work
     # Half turns about the principal axes give the other three quarters.
     cells = cells[: len(bounds.growth)]
-    at_pole = ~cover.forbidden & (cells.height + cells.half_height > 0.5 * np.pi - SLACK)
+    at_pole = (cells.height + cells.half_height > 0.5 * np.pi - SLACK) & (not cover.forbidden)
     while len(cells) and work < most:
         block, cells = cells[:_BLOCK], cells[_BLOCK:]
         work += _COST * len(block)

@@ -52,7 +52,8 @@ class GeodesicEnclosure:
     """Whether `upper` exceeds `lower` by no more than the width asked for; else the work did not suffice."""
     momentum: Array
     """(3,) of the geodesic that arrives at t = 1 with the length `upper`, or of a shorter one to the place where the
-    given one is at its upper cut time; the given one's where that is a conjugate point [kg m^2/s]."""
+    given one is at its upper cut time; the given one's where that is a conjugate point; of a diameter the one to the
+    far attitude [kg m^2/s]."""
     cells: int
     """Work done, in evaluated cells of momenta."""
 
