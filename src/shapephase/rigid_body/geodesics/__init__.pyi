@@ -29,7 +29,13 @@ from ._serret_andoyer_constants import (
 )
 from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
 from .distance import ShortestGeodesic, nearest_attitude, shortest_geodesic
-from .enclosures import GeodesicEnclosure, cut_time_enclosure, distance_enclosure, distance_enclosure_on_su2
+from .enclosures import (
+    GeodesicEnclosure,
+    cut_time_enclosure,
+    diameter_enclosure,
+    distance_enclosure,
+    distance_enclosure_on_su2,
+)
 from .left_invariant import LeftInvariantMetric, left_invariant_metric
 from .metric_profile import Assumptions, TabulatedStretch, assumptions, surface_of_metric
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
@@ -72,6 +78,7 @@ __all__ = [
     "cut_locus",
     "cut_time",
     "cut_time_enclosure",
+    "diameter_enclosure",
     "distance_enclosure",
     "distance_enclosure_on_su2",
     "ellipsoid",

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ... import so3
-from ...arrays import Array
+from ...arrays import Array, Mask
 from ._momentum_cover import (
     SLACK,
     TABLE_COST,
@@ -33,7 +33,7 @@ from ._momentum_cover import (
 )
 from ._momentum_flow import exponential_fields, momentum_flow, quaternion_flow
 
-_NEAR = 1.0  # [rad] up to which |J(theta)^-1 − 1| <= 0.51 theta, J the left or right derivative of the rotation vector
+NEAR = 1.0  # [rad] up to which |J(theta)^-1 − 1| <= 0.51 theta, J the left or right derivative of the rotation vector
 _JACOBIAN = 0.51
 _LOGARITHM = 1.05  # (theta/2)/sin(theta/2) at most
 _WORTH = 0.5  # of the centre's own bound: a cell whose bound is below is halved
@@ -94,44 +94,89 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class _Progress:
+class Progress:
     """Bounds for N cells at their times."""
 
     length: Array
     """(N,) below which no curve from any of the cell's geodesics comes to the attitude."""
     at_centre: Array
     """(N,) the bound of the centre's geodesic alone."""
-    across: Array
+    across: Mask
     """(N,) True where halving the azimuth makes the deviation smaller."""
 
 
-def _progress(cover: MomentumCover, bounds: FlowBounds, cells: Cells, goal: Goal) -> _Progress:
-    """How far the cells' geodesics still are from the goal."""
+@dataclass(frozen=True, eq=False)
+class CellEnds:
+    """Where the geodesics of N cells are at their times, relative to those of the centres."""
+
+    quats: Array
+    """(N, 4) attitudes of the centres' geodesics."""
+    momentum: Array
+    """(N, 3) theirs, in body axes."""
+    fields: Array
+    """(N, 3, 3) derivatives by n of the rotation vectors from there, in body axes."""
+    sides: list[Array]
+    """Two (N, 3): `fields` times half of the azimuth and of the height."""
+    radius: Array
+    """(N,) of the cells."""
+    bend: Array
+    """(N,) parts of n that are not linear in azimuth and height."""
+    angle: Array
+    """(N,) of the rotation vectors, at most."""
+    curving: Array
+    turned: Array
+    """(N,) `curving` and `turned`: rest per |q|², from the momentum's flow and from turns that do not commute."""
+    slack: Array
+    """(N,) above the rounding errors of an angle."""
+
+    @property
+    def rest(self) -> Array:
+        """(N,) length of what the rotation vectors have beside their linear part, up to 1 rad."""
+        return (self.curving + self.turned) * self.radius**2 + self.slack
+
+
+def cell_ends(cover: MomentumCover, bounds: FlowBounds, cells: Cells) -> CellEnds:
+    """Ends of geodesics at each cell's time."""
     a = cover.inverse_moments
     n, wide, high = cover.chart(cells.azimuth, cells.height)
     start = n * cover.units
     quats = quaternion_flow(a, start, cells.time)
-    xi = goal.errors(quats)
-    angle = np.linalg.norm(xi, axis=-1)
     attitude = so3.matrix_from_quat(quats)
-    momentum = so3.apply(so3.transpose(attitude), start)
     slope = momentum_flow(a, start, cells.time)[1]
-    z = so3.transpose(attitude) @ exponential_fields(a, start, cells.time, attitude, slope) * cover.units
-    sides = [
-        half[:, None] * so3.apply(z, side) for half, side in ((cells.half_azimuth, wide), (cells.half_height, high))
-    ]
-    bend, radius = cover.bend(cells), cover.radius(cells)
+    fields = so3.transpose(attitude) @ exponential_fields(a, start, cells.time, attitude, slope) * cover.units
+    radius = cover.radius(cells)
     growth, curving = bounds.at(cells.ancestor, cells.time)
-    turned, slack = 0.25 * _LOGARITHM * growth**2, SLACK * (1.0 + cells.time)
-    rest = (curving + turned) * radius**2 + slack
-    straight = half_diagonal(*sides) + np.linalg.norm(z, axis=(-2, -1)) * bend + rest
-    deviation = np.minimum(growth * radius, np.where(growth * radius < _NEAR, straight, np.inf))
+    return CellEnds(
+        quats=quats,
+        momentum=so3.apply(so3.transpose(attitude), start),
+        fields=fields,
+        sides=[
+            half[:, None] * so3.apply(fields, side)
+            for half, side in ((cells.half_azimuth, wide), (cells.half_height, high))
+        ],
+        radius=radius,
+        bend=cover.bend(cells),
+        angle=growth * radius,
+        curving=curving,
+        turned=0.25 * _LOGARITHM * growth**2,
+        slack=SLACK * (1.0 + cells.time),
+    )
+
+
+def progress(cover: MomentumCover, bounds: FlowBounds, cells: Cells, goal: Goal) -> Progress:
+    """How far the cells' geodesics still are from the goal."""
+    a, ends = cover.inverse_moments, cell_ends(cover, bounds, cells)
+    sides, bend, rest, second = ends.sides, ends.bend, ends.rest, ends.curving + ends.turned
+    xi = goal.errors(ends.quats)
+    angle = np.linalg.norm(xi, axis=-1)
+    straight = half_diagonal(*sides) + np.linalg.norm(ends.fields, axis=(-2, -1)) * bend + rest
+    deviation = np.minimum(ends.angle, np.where(ends.angle < NEAR, straight, np.inf))
     shortest = 1.0 / np.sqrt(a[0])
-    covectors = np.stack([momentum, cover.units**2 * xi])
+    covectors = np.stack([ends.momentum, cover.units**2 * xi])
     covectors /= np.maximum(np.sqrt(np.sum(a * covectors**2, axis=-1, keepdims=True)), _NO_LENGTH)
     size = np.linalg.norm(covectors, axis=-1)
     moved = sum(np.abs(np.sum(covectors * side, axis=-1)) for side in sides)
-    moved += np.linalg.norm(np.einsum("cni,nij->cnj", covectors, z), axis=-1) * bend + size * rest
+    moved += np.linalg.norm(np.einsum("cni,nij->cnj", covectors, ends.fields), axis=-1) * bend + size * rest
 
     def length(deviation: Array, missing: Array) -> Array:
         """The greatest bound, for an angle and a missing part along each covector."""
@@ -139,29 +184,29 @@ def _progress(cover: MomentumCover, bounds: FlowBounds, cells: Cells, goal: Goal
         quadratic, factor = 0.5 * _JACOBIAN * size / shortest**2, 1.0 + _JACOBIAN * size * deviation / shortest
         missing = np.maximum(missing, 0.0)
         root = 2.0 * missing / (factor + np.sqrt(factor**2 + 4.0 * quadratic * missing))
-        return np.maximum(far, np.minimum(shortest * (_NEAR - deviation), root.max(axis=0)))
+        return np.maximum(far, np.minimum(shortest * (NEAR - deviation), root.max(axis=0)))
 
     along = np.sum(covectors * xi, axis=-1)
     ahead, at_centre = length(deviation, along - moved), length(np.zeros_like(angle), along)
     if cover.forbidden:
         # The momentum's part of the rest is horizontal but for the turn since.
-        rest = (curving * np.minimum(1.0, cells.time / shortest) + turned) * radius**2 + slack
-        upwards = np.abs(sides[0][:, 2]) + np.abs(sides[1][:, 2]) + np.linalg.norm(z[:, 2], axis=-1) * bend + rest
-        ahead = np.maximum(ahead, _climb(a, np.abs(xi[:, 2]), upwards, deviation))
-        at_centre = np.maximum(at_centre, _climb(a, np.abs(xi[:, 2]), np.zeros_like(angle), np.zeros_like(angle)))
-    widths = cells.half_azimuth * np.linalg.norm(wide, axis=-1), cells.half_height * np.linalg.norm(high, axis=-1)
+        rest = (ends.curving * np.minimum(1.0, cells.time / shortest) + ends.turned) * ends.radius**2 + ends.slack
+        upwards = np.abs(sides[0][:, 2]) + np.abs(sides[1][:, 2]) + rest
+        upwards += np.linalg.norm(ends.fields[:, 2], axis=-1) * bend
+        ahead = np.maximum(ahead, least_climb(a, np.abs(xi[:, 2]), upwards, deviation))
+        at_centre = np.maximum(at_centre, least_climb(a, np.abs(xi[:, 2]), np.zeros_like(angle), np.zeros_like(angle)))
     effects = [
-        np.linalg.norm(side, axis=-1) + (curving + turned) * radius * width
-        for side, width in zip(sides, widths, strict=True)
+        np.linalg.norm(side, axis=-1) + second * ends.radius * width
+        for side, width in zip(sides, cover.widths(cells), strict=True)
     ]
-    return _Progress(
+    return Progress(
         length=np.maximum(ahead, 0.0) * (1.0 - SLACK),
         at_centre=at_centre,
         across=effects[0] > effects[1],
     )
 
 
-def _climb(inverse_moments: Array, height: Array, upwards: Array, deviation: Array) -> Array:
+def least_climb(inverse_moments: Array, height: Array, upwards: Array, deviation: Array) -> Array:
     """Length of a curve that turns by `height` about the forbidden axis, less up to `upwards` at its start.
 
     Half a circle sweeps the greatest area; the other terms are of third order, or due to the start's deviation.
@@ -177,7 +222,7 @@ def _climb(inverse_moments: Array, height: Array, upwards: Array, deviation: Arr
         swept = scale * length**2 / (2.0 * np.pi) + 0.5 * deviation * angle
         third = angle**2 * (0.125 * upwards + 0.025 * reach * angle + 0.047 * reach**2)
         third += 0.085 * reach * angle * upwards
-        best = np.where((swept + third < missing) & (reach < _NEAR), length, best)
+        best = np.where((swept + third < missing) & (reach < NEAR), length, best)
     return best
 
 
@@ -239,7 +284,7 @@ def first_arrival(
         order = np.argsort(cells.time, kind="stable")
         block, cells = cells[order[:_BLOCK]], cells[order[_BLOCK:]]
         work += len(block)
-        ahead = _progress(cover, bounds, block, goal)
+        ahead = progress(cover, bounds, block, goal)
         block = replace(block, time=block.time + ahead.length)
         left = ~(block.time >= stop)
         if arrival is not None:
@@ -279,7 +324,7 @@ def _known_arrival(cover: MomentumCover, momentum: Array, count: int) -> KnownAr
     size, speed = float(np.linalg.norm(momentum)), float(np.sqrt(a[0]))
     # The way over eta has the rotation vector eta u but for `turning` eta².
     turning = 0.5 * a[0] * speed * size + 0.27 * a[0]
-    before = min(0.5 / (size * turning), _NEAR / speed)
+    before = min(0.5 / (size * turning), NEAR / speed)
     before = min(before, 0.5 * singular[2] / (float(bounds.rate[0].max()) + speed * singular[0]))
     curving = float(bounds.bend[0, -1] + 0.25 * _LOGARITHM * bounds.growth[0, -1] ** 2)
     early = duration + 2.0 * size * curving  # eta per |q|²

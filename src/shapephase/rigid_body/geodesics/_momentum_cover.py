@@ -59,7 +59,7 @@ class Cells:
         columns = {f.name: np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)}
         return replace(self, **columns)
 
-    def halved(self, across: Array) -> Self:
+    def halved(self, across: Mask) -> Self:
         """Two halves of each, cut across the azimuth where `across` holds, else across the height."""
         wide, high = np.where(across, 0.5, 1.0) * self.half_azimuth, np.where(across, 1.0, 0.5) * self.half_height
         to_side, up = self.half_azimuth - wide, self.half_height - high
@@ -121,6 +121,11 @@ class MomentumCover:
         sides = cells.half_azimuth[:, None] * wide, cells.half_height[:, None] * high
         return half_diagonal(*sides) + self.bend(cells)
 
+    def widths(self, cells: Cells) -> tuple[Array, Array]:
+        """Half of the extent of n along azimuth and height: (N,) twice."""
+        _, wide, high = self.chart(cells.azimuth, cells.height)
+        return cells.half_azimuth * np.linalg.norm(wide, axis=-1), cells.half_height * np.linalg.norm(high, axis=-1)
+
     def couplings(self) -> Array:
         """kappa with n_i' = kappa_i n_j n_k: (3,)."""
         first, second, third = self.units
@@ -145,6 +150,8 @@ class FlowBounds:
     """Bounds for all pairs of momenta of a cell, for M cells of a coarse grid at S + 1 equal times from 0."""
 
     step: float
+    alpha: float
+    """Largest angular velocity of a unit of n."""
     growth: Array
     """(M, S + 1) W, the angle by which attitudes deviate, per |q|."""
     bend: Array
@@ -159,6 +166,11 @@ class FlowBounds:
         node = np.minimum(np.ceil(times / self.step * (1.0 - SLACK)).astype(np.int64), self.growth.shape[1] - 1)
         return self.growth[rows, node], self.bend[rows, node]
 
+    def momentum_growth(self, rows: Integers, times: Array) -> Array:
+        """K at each time, by which momenta n deviate per |q|."""
+        node = np.minimum((times / self.step * (1.0 + SLACK)).astype(np.int64), self.growth.shape[1] - 1)
+        return self.rate[rows, node] / self.alpha
+
 
 def flow_bounds(cover: MomentumCover, cells: Cells, count: int) -> FlowBounds:
     """Solve the integral inequalities for the deviations, node by node, in `count` steps.
@@ -169,9 +181,8 @@ def flow_bounds(cover: MomentumCover, cells: Cells, count: int) -> FlowBounds:
     start, _, _ = cover.chart(cells.azimuth, cells.height)
     radius = cover.radius(cells)
     high = np.abs(start[:, 2]) + radius
-    rate = cover.growth_rate(high)
     step = cover.duration / count
-    between = np.exp(rate * step)
+    between = np.exp(cover.growth_rate(high) * step)
     largest = np.abs(couplings).max()
     linear, square = _CUBIC * largest, 0.5 * _CUBIC * largest
     size = len(cells)
@@ -200,7 +211,8 @@ def flow_bounds(cover: MomentumCover, cells: Cells, count: int) -> FlowBounds:
             growth[:, k] = growth[:, k - 1] + alpha * any_pair[:, -1] * step
             bend[:, k] = bend[:, k - 1] + alpha * rest[:, -1] * step
         closed = first[:, -1] < _LOOSE * centre
-    return FlowBounds(step=step, growth=growth, bend=bend, rate=alpha * between[:, None] * first, closed=closed)
+        rate = alpha * between[:, None] * first
+    return FlowBounds(step=step, alpha=alpha, growth=growth, bend=bend, rate=rate, closed=closed)
 
 
 def _norms(matrices: Array) -> Array:
@@ -226,37 +238,39 @@ def coarse_cells(cover: MomentumCover, highest: float, most: int) -> tuple[Cells
     else:
         top = float(np.arcsin(min(1.0, highest * np.sqrt(cover.inverse_moments[2]))))
         start = cover.elongation
-    rate = float(cover.growth_rate(np.array([start]))[0])
-    count = int(np.clip(np.ceil(rate * cover.duration / _STEP_GROWTH), _LEAST_STEPS, _MOST_STEPS))
+    fastest = float(cover.growth_rate(np.array([start]))[0])
+    count = int(np.clip(np.ceil(fastest * cover.duration / _STEP_GROWTH), _LEAST_STEPS, _MOST_STEPS))
     rows = int(np.ceil(top * cover.elongation / _COARSE))
-    wide, high = 0.5 * np.pi / _AZIMUTHS, 0.5 * top / rows
-    azimuth, height = np.meshgrid(wide * (2 * np.arange(_AZIMUTHS) + 1), high * (2 * np.arange(rows) + 1))
+    half_azimuth, half_height = 0.5 * np.pi / _AZIMUTHS, 0.5 * top / rows
+    azimuth, height = np.meshgrid(
+        half_azimuth * (2 * np.arange(_AZIMUTHS) + 1), half_height * (2 * np.arange(rows) + 1)
+    )
     every = np.ones(azimuth.size)
     open_cells = Cells(
         azimuth=np.asarray(azimuth.ravel(), dtype=float),
         height=np.asarray(height.ravel(), dtype=float),
-        half_azimuth=wide * every,
-        half_height=high * every,
+        half_azimuth=half_azimuth * every,
+        half_height=half_height * every,
         time=0.0 * every,
         ancestor=np.zeros(azimuth.size, dtype=np.int64),
     )
     cells, tables, computed = open_cells[:0], [], 0
-    while len(open_cells) and computed <= most:
+    while True:
         block, open_cells = open_cells[:_BLOCK], open_cells[_BLOCK:]
         computed += len(block)
         bounds = flow_bounds(cover, block, count)
         cells = cells.joined(block[bounds.closed])
         tables.append([table[bounds.closed] for table in (bounds.growth, bounds.bend, bounds.rate)])
         loose = block[~bounds.closed]
-        _, wider, higher = cover.chart(loose.azimuth, loose.height)
-        sides = loose.half_azimuth * np.linalg.norm(wider, axis=-1), loose.half_height * np.linalg.norm(higher, axis=-1)
-        open_cells = open_cells.joined(loose.halved(sides[0] > sides[1]))
+        wide, high = cover.widths(loose)
+        open_cells = open_cells.joined(loose.halved(wide > high))
+        if not len(open_cells) or computed > most:
+            break
     if len(open_cells):
         cells = cells[:0]
-    growth, bend, rate_table = (np.concatenate(columns) for columns in zip(*tables, strict=True))
+    growth, bend, rate = (np.concatenate(columns) for columns in zip(*tables, strict=True))
+    bounds = replace(bounds, growth=growth, bend=bend, rate=rate, closed=np.ones(len(growth), dtype=bool))
     cells = replace(cells, ancestor=np.arange(len(cells)))
     cells = cells.joined(replace(cells, azimuth=cells.azimuth + np.pi))
     cells = cells.joined(replace(cells, azimuth=-cells.azimuth, height=-cells.height))
-    closed = np.ones(len(growth), dtype=bool)
-    step = cover.duration / count
-    return cells, FlowBounds(step=step, growth=growth, bend=bend, rate=rate_table, closed=closed), computed
+    return cells, bounds, computed

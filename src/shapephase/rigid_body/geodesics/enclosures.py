@@ -1,4 +1,4 @@
-"""Enclosures of distances and cut times of left-invariant metrics on SO(3) and SU(2).
+"""Enclosures of distances, cut times and diameters of left-invariant metrics on SO(3) and SU(2).
 
 For three different moments no theorem says which geodesics are the shortest. A geodesic that arrives bounds the
 distance from above. From below it is bounded by a search that excludes all momenta of unit speed up to a time, cell by
@@ -22,6 +22,8 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ._arrival_search import Goal, first_arrival
 from ._momentum_flow import quaternion_flow
+from ._symmetric_arrivals import all_met
+from .axisymmetric_cut import axisymmetric_metric
 from .distance import (
     MOST_CELLS,
     arrival_near,
@@ -40,17 +42,18 @@ _SHORTER = 1e-9  # relative: by less, a length differs from that of the geodesic
 
 @dataclass(frozen=True, eq=False)
 class GeodesicEnclosure:
-    """Bounds of a distance or of a cut time. Made by `distance_enclosure` and `cut_time_enclosure`."""
+    """Bounds of a distance, a cut time or a diameter. Made by `distance_enclosure` and the functions beside it."""
 
     lower: float
-    """No geodesic arrives that is shorter than this distance; or the geodesic is the shortest up to this time."""
+    """No geodesic arrives that is shorter than this; or the geodesic is the shortest up to this time."""
     upper: float
-    """A geodesic of this length arrives; or the geodesic is no longer the shortest after this time."""
+    """A geodesic of this length arrives, of a diameter anywhere; or this one is not the shortest after this time."""
     certified: bool
     """Whether `upper` exceeds `lower` by no more than the width asked for; else the work did not suffice."""
     momentum: Array
     """(3,) of the geodesic that arrives at t = 1 with the length `upper`, or of a shorter one to the place where the
-    given one is at its upper cut time; the given one's where that is a conjugate point [kg m^2/s]."""
+    given one is at its upper cut time; the given one's where that is a conjugate point; of a diameter the one to the
+    far attitude [kg m^2/s]."""
     cells: int
     """Work done, in evaluated cells of momenta."""
 
@@ -172,6 +175,65 @@ def cut_time_enclosure(
         momentum=given if rival is None else metric.axes @ rival,
         cells=work,
     )
+
+
+def diameter_enclosure(
+    metric: LeftInvariantMetric, *, width: float = 2e-2, most_cells: int = MOST_CELLS
+) -> GeodesicEnclosure:
+    """Bounds of the largest distance of two attitudes, proven but for rounding [sqrt(kg) m].
+
+    From below by the distance to half a turn about the axis of the largest moment, whose geodesic is the `momentum`.
+    From above by a time before which every geodesic meets another one of its length that is symmetric to it, or by the
+    diameters of the two next larger axisymmetric metrics.
+
+    Raises ShapeError if width is not between 0 and 1 or most_cells below 1; AccuracyNotReached as `shortest_geodesic`.
+
+    Parameters
+    ----------
+    metric : of `left_invariant_metric`
+    width : relative to the diameter
+    most_cells : of work; where they do not suffice the enclosure is wider
+
+    Notes
+    -----
+    Equation :eq:`symmetric-arrivals` of the documentation. That no attitude is further than that half turn is no
+    theorem for three different moments.
+
+    Examples
+    --------
+    >>> metric = sp.rigid_body.geodesics.left_invariant_metric([1.0, 2.0, 3.0])
+    >>> found = sp.rigid_body.geodesics.diameter_enclosure(metric)
+    >>> print(found.certified, f"{found.upper:.6f} = pi sqrt(3)")
+    True 5.441398 = pi sqrt(3)
+    """
+    check_object(metric, "LeftInvariantMetric", "metric")
+    part, most = width_argument(width), whole_argument(most_cells, "most_cells", 1)
+    farthest = _distance(metric, Goal(quat=np.array([0.0, 0.0, 1.0, 0.0]), on_su2=False), 0.5 * part, (most + 1) // 2)
+    upper, work = _axial_diameter(metric), farthest.cells
+    time = max(farthest.lower / (1.0 - part * (1.0 - _SHORTER)), farthest.upper * (1.0 + 0.5 * part))
+    if time < upper:
+        half = 0.5 * time * float(np.sqrt(metric.inverse_moments[2]))
+        about_third = found_geodesic(metric, Goal(quat=np.array([0.0, 0.0, np.sin(half), np.cos(half)]), on_su2=False))
+        length = about_third.length + gap(metric, about_third.residual)
+        met, cells = all_met(metric.inverse_moments, time, length, max(most - work, 0))
+        upper, work = time if met else upper, work + cells
+    return GeodesicEnclosure(
+        lower=farthest.lower,
+        upper=upper,
+        certified=upper - farthest.lower <= part * upper,
+        momentum=farthest.momentum,
+        cells=work,
+    )
+
+
+def _axial_diameter(metric: LeftInvariantMetric) -> float:
+    """The diameter of the closed form, or the smaller one of two axisymmetric metrics that are nowhere shorter."""
+    closed, _ = axial_form(metric)
+    if closed is not None:
+        return closed.diameter
+    smallest, middle, largest = metric.moments.tolist()
+    oblate = axisymmetric_metric(middle, largest).diameter
+    return min(oblate, axisymmetric_metric(largest, smallest).diameter) if np.isfinite(largest) else oblate
 
 
 def _distance(metric: LeftInvariantMetric, goal: Goal, width: float, most_cells: int) -> GeodesicEnclosure:
