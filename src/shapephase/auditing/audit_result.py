@@ -159,7 +159,7 @@ class Audit:
     hypotheses : all that were fitted, what leaves least first; none where all is right
     cause : the hypotheses that explain what is wrong and that the noise cannot separate; one: it is named
     step_order : how drifts go with the integrator's step; None where the runs do not tell
-    notes : what else is to be said
+    notes : caveats, in words
 
     Examples
     --------
@@ -185,7 +185,7 @@ class Audit:
 
     @property
     def wrong(self) -> bool:
-        """Whether a run breaks a law by more than noise and tolerance; neither right nor wrong: it cannot be told."""
+        """True where a run breaks a law by more than noise and tolerance; else samples may hide it."""
         return not all(run.right for run in self.runs)
 
     @property

@@ -69,7 +69,7 @@ class AthleteTurns:
         return (
             f"As an athlete: {_count(self.somersaults)} somersaults and {_count(self.twists)} twists (to halves "
             f"{halves[0]:g} and {halves[1]:g}), tilt at most {math.degrees(self.largest_tilt):.1f} degrees "
-            f"at {self.tilt_time:.4g} s{rates} (± {self.error:.0e} turns); {self.axes}."
+            f"at {self.tilt_time:.4g} s{rates} (numerical error {self.error:.0e} turns); {self.axes}."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -146,13 +146,13 @@ class TurnCounts:
         if self.about_momentum:
             sentences.append(
                 "The angle of a rotation does not count whole turns: about its momentum the body turned "
-                f"{_count(self.about_momentum)} times (± {self.error:.0e}; the Montgomery phase)."
+                f"{_count(self.about_momentum)} times (the Montgomery phase; numerical error {self.error:.0e})."
             )
         elif self.rotation_number is not None and self.rotation_axis is not None:
             axis = " ".join(f"{value + 0.0:.6g}" for value in np.round(self.rotation_axis, 9))
             sentences.append(
                 f"The body turns in a plane, about ({axis}), base axes: rotation number {_count(self.rotation_number)} "
-                f"(± {self.error:.0e} turns)."
+                f"(numerical error {self.error:.0e} turns)."
             )
         if self.athlete is not None:
             sentences.append(str(self.athlete))
