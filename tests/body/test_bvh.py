@@ -246,6 +246,7 @@ def test_the_jump_that_ships_is_counted_within_its_bars():
     turns = sp.phases.athlete_turns(found.motion)
     _, _, twist = found.motion.somersault_tilt_twist([0.0, 1.0], lateral="x", longitudinal="y", up="y")
     assert turns.twists == pytest.approx(np.diff(twist)[0] / (2.0 * np.pi), abs=0.01)
+    assert bars.twists is not None
     assert 0.0 < bars.twists < 0.003
 
 
