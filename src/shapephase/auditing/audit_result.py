@@ -1,4 +1,4 @@
-"""What an audit has found: of each run, and together."""
+"""Results of an audit, by run and together."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_SHOWN = 8  # hypotheses in a table
 
 @frozen(kw_only=True)
 class RunAudit:
-    """What was found of one run.
+    """Result of an audit for one run.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class RunAudit:
 
 @frozen(kw_only=True)
 class Audit:
-    """What an audit has found.
+    """Result of an audit.
 
     Attributes
     ----------

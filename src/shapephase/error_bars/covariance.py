@@ -19,7 +19,7 @@ from ..deformation.rotors import Rotor
 from ..display import frozen
 from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
-from ..reconstruction.attitude_angles import count_slopes
+from ..phases.whole_turns import count_slopes
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples

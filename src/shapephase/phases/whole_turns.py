@@ -14,6 +14,7 @@ from ..arrays import Array
 from ..display import short_repr
 from ..errors import ChartPoleError, ShapeError
 from ..reconstruction import AthleteAxes
+from ..reconstruction.attitude_angles import athlete_slopes
 from ..reconstruction.reconstruction import Motion
 from ..refinement import least_over
 from .phase_split import PhaseSplit
@@ -243,6 +244,25 @@ def turn_counts(motion: Motion, split: PhaseSplit) -> TurnCounts:
     athlete = None if axes is None else athlete_turns(motion, axes)
     number, axis = _rotation_in_plane(motion)
     return TurnCounts(about, athlete, error if athlete is None else max(error, athlete.error), number, axis)
+
+
+def count_slopes(motion: Motion) -> Array | None:
+    """Return derivatives of somersaults and twists by turns of the last attitude, inertial, and the first, base axes.
+
+    (2, 6) [revolutions per rad], about the same axes; None where nothing is counted or the tilt is a right angle.
+    """
+    check_object(motion, "Motion", "motion")
+    axes = motion.counted_axes()
+    if axes is None:
+        return None
+    known = {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
+    _, tilt, twist = motion.somersault_tilt_twist([0.0, motion.duration], **known)
+    try:
+        slopes = athlete_slopes(tilt, twist)
+    except ChartPoleError:
+        return None
+    first, last = slopes[:, [0, 2]] @ axes.matrices[1].T / _TURN
+    return np.hstack([last @ motion.final_attitude.T, -first])
 
 
 def _times_within_steps(motion: Motion) -> Array:

@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from .. import so3
 from ..arrays import Array
 from ..errors import ChartPoleError, unknown_name
-
-if TYPE_CHECKING:
-    from .reconstruction import Motion
 
 _AXES = ("x", "y", "z")
 _TURN = 2.0 * np.pi
@@ -228,24 +225,6 @@ def athlete_slopes(tilt: Array, twist: Array) -> Array:
     turning = np.stack([sine / np.cos(tilt), cosine / np.cos(tilt), zero], axis=-1)
     along = np.sin(tilt)[..., None] * turning + np.array([0.0, 0.0, 1.0])
     return np.stack([turning, np.stack([cosine, -sine, zero], axis=-1), along], axis=-2)
-
-
-def count_slopes(motion: Motion) -> Array | None:
-    """Return derivatives of somersaults and twists by turns of the last attitude, inertial, and the first, base axes.
-
-    (2, 6) [revolutions per rad], about the same axes; None where nothing is counted or the tilt is a right angle.
-    """
-    axes = motion.counted_axes()
-    if axes is None:
-        return None
-    known = {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
-    _, tilt, twist = motion.somersault_tilt_twist([0.0, motion.duration], **known)
-    try:
-        slopes = athlete_slopes(tilt, twist)
-    except ChartPoleError:
-        return None
-    first, last = slopes[:, [0, 2]] @ axes.matrices[1].T / _TURN
-    return np.hstack([last @ motion.final_attitude.T, -first])
 
 
 def euler_chart(sequence: str) -> EulerAngles:
