@@ -401,7 +401,7 @@ def _check_signal(shapes: Array, noise: Array, joint_names: Sequence[str]) -> No
         )
     balls = ball_columns(joint_names)
     in_balls = {column for ball in balls for column in range(ball.start, ball.stop)}
-    groups = [(joint_names[ball.start].removesuffix(".x"), ball) for ball in balls]
+    groups = [(str(joint_names[ball.start]).removesuffix(".x"), ball) for ball in balls]
     groups += [(name, slice(k, k + 1)) for k, name in enumerate(joint_names) if k not in in_balls]
     still = [f"{name} (by {spread[columns].max():.3g})" for name, columns in groups if drowned[columns].all()]
     if still:
