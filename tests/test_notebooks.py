@@ -42,7 +42,7 @@ def contents(path):
 
 def named(cells):
     """The extras that the first cell says to install."""
-    return re.findall(r"pip install 'shapephase\[([a-z,]+)\]'", "".join(cells[0]["source"]))[0]
+    return re.findall(r"pip install '\.\[([a-z,]+)\]'", "".join(cells[0]["source"]))[0]
 
 
 def installs(cell):
@@ -78,7 +78,7 @@ def test_a_notebook_says_what_to_install_shows_a_picture_at_once_and_where_to_go
     assert set(named(cells).split(",")) <= set(BINDER)
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS[1:], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_on_colab_a_notebook_installs_the_extras_that_it_names_from_the_repository(path):
     cells = contents(path)["cells"]
     source = "".join(cells[1]["source"])

@@ -1,4 +1,4 @@
-"""What readers can click on and see in the built site: links lead somewhere, the three ways too, figures are drawn."""
+"""What readers click on and see in the built site: links lead somewhere, three clicks are enough, figures are drawn."""
 
 from __future__ import annotations
 
@@ -11,10 +11,25 @@ from urllib.parse import unquote, urlsplit
 
 _WAYS = "three-ways-from-here"
 _CLICKS = 3
+SOUGHT = {
+    "how to install": "pip install",
+    "the loop of a cat": "shapephase loop cat cat_righting --out",
+    "explore": "shapephase explore",
+    "twist in time": "shapephase plot somersault diver robots/diver_dive.mot",
+    "twist with bars": "shapephase split diver robots/diver_dive.mot --flight auto",
+    "motion capture": "shapephase split robots/formats/jump.bvh",
+    "the arms' share": "shapephase contributions diver robots/diver_dive.mot --of twist",
+    "wheels": "shapephase split satellite robots/satellite_log.csv --rotor-speed",
+    "error bars": "--joint-noise",
+    "an audit": "shapephase audit",
+    "a plan": "shapephase plan satellite --undo satellite_sweep",
+    "how to cite": "How to cite",
+}
+"""What a newcomer looks for, and words of a page that has it."""
 
 
 class _Page(HTMLParser):
-    """Links and anchors of a page: all of them, those of its text, and those of each paragraph of the three ways."""
+    """Words of a page's text, its anchors, and its links: all, those of its text, those of each of the three ways."""
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -22,6 +37,7 @@ class _Page(HTMLParser):
         self.links: list[str] = []
         self.in_text: set[str] = set()
         self.ways: list[list[str]] = []
+        self.words = ""
         self.unseen = False
         self._depth: dict[str, int] = defaultdict(int)
         self._sections: list[str] = []
@@ -46,7 +62,9 @@ class _Page(HTMLParser):
             self.links.append(found["src"])
 
     def handle_data(self, data: str) -> None:
-        """Note a figure of which a cell printed the words."""
+        """Note words of the text, and a figure of which a cell printed the words."""
+        if self._depth["article"]:
+            self.words += data
         self.unseen |= data.startswith("<Figure size")
 
     def handle_endtag(self, tag: str) -> None:
@@ -107,10 +125,23 @@ def lost_ways(found: dict[Path, _Page], front: Path) -> Iterator[str]:
             page = goal
 
 
+def far_off(found: dict[Path, _Page], front: Path) -> Iterator[str]:
+    """What a newcomer looks for and finds on no page within three clicks on links in texts, from the front page."""
+    near, newest = {front}, {front}
+    for _ in range(_CLICKS):
+        targets = (_target(page, link) for page in newest for link in found[page].in_text)
+        newest = {target[0] for target in targets if target and target[0] in found} - near
+        near |= newest
+    for thing, words in SOUGHT.items():
+        if not any(words in found[page].words for page in near):
+            yield f"{front.name}: {thing} ({words!r}) is more than {_CLICKS} clicks away"
+
+
 def main(site: Path) -> int:
     """Print what is wrong; returns how much."""
     found = pages(site.resolve())
-    wrong = [*broken(found), *lost_ways(found, site.resolve() / "index.html")]
+    front = site.resolve() / "index.html"
+    wrong = [*broken(found), *lost_ways(found, front), *far_off(found, front)]
     links = sum(len(page.links) for page in found.values())
     print("\n".join([*wrong, f"{len(found)} pages, {links} links, {len(wrong)} faults"]))
     return len(wrong)

@@ -280,7 +280,7 @@ class MissingExtraError(ShapePhaseError, ImportError):
 
 
 class RunStopped(ShapePhaseError):
-    """The `progress` callback of a run stopped it; nothing of it is kept but a complete look at its path.
+    """The `progress` callback of a run stopped it; of it, only a complete scan of its path is kept.
 
     Examples
     --------

@@ -93,15 +93,15 @@ def arc_areas(corners: Array, references: Array) -> Array:
 def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
     """Signed area that curves enclose, closed by the great circle from their ends to their starts: (...) [sr].
 
+    The area between the curve and its chord, from edge to edge, is integrated with the chord's start as reference,
+    where the area form is smooth; the area of the polygon of chords is exact. So the singularity of the area form is
+    never near, whatever the curve winds around.
+
     Parameters
     ----------
     curve : times (N,) -> directions (..., N, 3) and their rates, smooth between the edges
     edges : (K + 1,) times; the curve's kinks must be among them, others may go unnoticed
     tolerance : of the area [sr]
-
-    The area between the curve and its chord, from edge to edge, is integrated with the chord's start as reference,
-    where the area form is smooth; the area of the polygon of chords is exact. So the singularity of the area form is
-    never near, whatever the curve winds around.
 
     Raises
     ------

@@ -233,6 +233,28 @@ def test_the_content_tells_the_format_and_other_bodies_have_no_such_motion(tmp_p
         sp.read_shape_path(write(tmp_path / "m.bvh", text), sp.load_body("cat"))
 
 
+def test_the_jump_that_ships_is_counted_within_its_bars():
+    """The momentum that the file was made of, and twists about the axes of the skeleton: y up, x from right to left."""
+    person = load(bvh_files.JUMP)
+    found = fitted(person, sp.read_recorded_motion(bvh_files.JUMP, person, flight="auto"))
+    bars = sp.uncertainty(found.motion, joints="0.2deg", start=found)
+    off = found.momentum - bvh_files.JUMP_MOMENTUM
+    assert off @ np.linalg.solve(bars.start[3:, 3:], off) < 16.3  # one of a thousand takes is beyond
+    axes = found.motion.athlete_axes()
+    assert axes.by_links
+    np.testing.assert_allclose(axes.lateral, [1.0, 0.0, 0.0], atol=0.01)
+    turns = sp.phases.athlete_turns(found.motion)
+    _, _, twist = found.motion.somersault_tilt_twist([0.0, 1.0], lateral="x", longitudinal="y", up="y")
+    assert turns.twists == pytest.approx(np.diff(twist)[0] / (2.0 * np.pi), abs=0.01)
+    assert bars.twists is not None
+    assert 0.0 < bars.twists < 0.003
+
+
+@pytest.mark.full
+def test_the_jump_is_written_anew_as_it_ships():
+    assert bvh_files.jump_text() == bvh_files.JUMP.read_text(encoding="utf-8")
+
+
 def one_channel(rows):
     """A file in which the left knee has one channel."""
     text = re.sub(r"(JOINT LeftLeg\n.*\n.*\n\s+)CHANNELS 3 .*", r"\1CHANNELS 1 Xrotation", skeleton_text())

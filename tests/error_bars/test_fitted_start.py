@@ -92,6 +92,23 @@ def test_errors_of_start_and_momentum_go_together(exact: sp.RecordedMomentum):
     np.testing.assert_allclose(whole.final_attitude, joint.final_attitude, rtol=1e-12)
 
 
+def test_bars_of_somersaults_and_twists_are_those_of_moved_starts(exact: sp.RecordedMomentum):
+    """Central differences of motions with other starts and momenta, counted about the same axes."""
+    motion, bars, step = exact.motion, sp.uncertainty(exact.motion, start=exact.covariance), 1e-4
+    axes = motion.counted_axes()
+    same = {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
+    moves = step * np.vstack([np.eye(6), -np.eye(6)])
+    starts = motion.initial_attitude @ so3.exp(moves[:, :3])
+    moved = sp.reconstruct(motion.deformation, motion.momentum + moves[:, 3:], starts, tolerance=1e-10)
+    somersault, _, twist = moved.somersault_tilt_twist([0.0, motion.duration], **same)
+    for angle, bar in ((somersault, bars.somersaults), (twist, bars.twists)):
+        counts = np.diff(angle, axis=1)[:, 0] / (2.0 * np.pi)
+        slope = (counts[:6] - counts[6:]) / (2.0 * step)
+        assert bar == pytest.approx(np.sqrt(slope @ exact.covariance @ slope), rel=1e-5)
+    cat = sp.reconstruct(sp.articulated("cat_two_halves", sp.examples.kane_scher(0.0, 0.5)), [0.0, 0.0, 0.005])
+    assert sp.uncertainty(cat, momentum=1e-5).twists is None
+
+
 def test_masses_that_are_not_known_move_the_momentum_instead_of_the_attitudes(exact: sp.RecordedMomentum):
     """Whatever the masses, the recorded attitudes are what they are; the momentum that goes with them is not."""
     errors = sp.InertiaErrors(masses=0.05)

@@ -1,22 +1,28 @@
 """BVH files written for tests: a skeleton with the names and the order of channels of a public library, and motions.
 
 The numbers are our own, of a person of 1.74 m in units of 0.05 m. Written and posed here without the library.
+`python -m support.bvh_files`, in `tests/`, writes the jump of `robots/formats` anew.
 """
 
 from __future__ import annotations
 
+import re
+import tempfile
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.errors import IgnoredElementWarning
+from support.places import ROBOTS
 
 UNIT = 0.05
 """[m]"""
 ZYX = ("Zrotation", "Yrotation", "Xrotation")
+_RIGID = re.compile("HipJoint|ToeBase|FingerBase|LowerBack|Neck|Shoulder")  # bones that a solver keeps still
 _LIMBS = {
     "Left": (1.0, "LeftToeBase", "LeftFingerBase"),
     "Right": (-1.0, "RightToeBase", "RightFingerBase"),
@@ -132,3 +138,42 @@ def load(path, **options):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", IgnoredElementWarning)
         return sp.load_body(path, **{"length_unit": UNIT, "person_mass": 70.0, **options})
+
+
+JUMP = ROBOTS / "formats" / "jump.bvh"
+JUMP_MOMENTUM = np.array([75.0, 0.0, 0.0])
+"""[kg m^2/s] Forwards about the axis from right to left."""
+
+
+def jump_text() -> str:
+    """Somersault with a twist off a trampoline: the left arm lowers and lifts again; with noise."""
+    rng, step = np.random.default_rng(6), 1.0 / 60.0
+    times = step * np.arange(61)
+    rows, names = np.zeros((len(times), len(columns()))), columns()
+
+    def rise(first: float, last: float) -> np.ndarray:
+        part = np.clip((times - first) / (last - first), 0.0, 1.0)
+        return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+
+    lowered, pike = rise(0.12, 0.4) - rise(0.72, 0.97), 1.0 - rise(0.0, 0.25) + rise(0.75, 1.0)
+    turned = {"LeftArm_Z": 80.0 - 155.0 * lowered, "RightArm_Z": np.full(len(times), -80.0), "Spine_X": 10.0 * pike}
+    for side in _LIMBS:
+        turned |= {f"{side}UpLeg_X": -15.0 * pike, f"{side}Leg_X": 20.0 * pike}
+    for name, angles in turned.items():
+        rows[:, names.index(f"{name}rotation")] = angles
+    with tempfile.TemporaryDirectory() as folder:
+        body = load(write(Path(folder) / "jump.bvh", bvh_text(rows, step)))
+        path = sp.read_shape_path(body.file, body)
+        flown = sp.reconstruct(sp.articulated(body, path), JUMP_MOMENTUM)
+        places = flown.base_position(times, start=[0.0, 1.2, 0.0], velocity=[0.0, 4.9, 0.2], gravity=[0.0, -9.81, 0.0])
+    noise = rng.normal(size=(len(times), 3))
+    hips = Rotation.from_matrix(flown.attitude(times)) * Rotation.from_rotvec(np.radians(0.3) * noise)
+    rows[:, :3] = (places + 0.001 * rng.normal(size=places.shape)) / UNIT
+    rows[:, 3:6] = hips.as_euler("ZYX", degrees=True)
+    tracked = [k for k, name in enumerate(names) if k > 5 and not _RIGID.search(name)]
+    rows[:, tracked] += 0.2 * rng.normal(size=(len(times), len(tracked)))
+    return bvh_text(rows.round(2), step)
+
+
+if __name__ == "__main__":
+    write(JUMP, jump_text())

@@ -44,7 +44,7 @@ _OVERLAP = 8  # windows begin at every eighth of their length, so that their num
 
 @dataclass(frozen=True)
 class AirbornePart:
-    """Which samples are audited, and how they were found.
+    """Audited samples, and how they were found.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ _AXES = "xyz"
 
 @dataclass(frozen=True, kw_only=True)
 class StepOrder:
-    """How what is wrong goes with the step of the integrator.
+    """Dependence of the error on the step of the integrator.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What an audit has found: of each run, and together."""
+"""Results of an audit, by run and together."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_SHOWN = 8  # hypotheses in a table
 
 @frozen(kw_only=True)
 class RunAudit:
-    """What was found of one run.
+    """Result of an audit for one run.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class RunAudit:
 
 @frozen(kw_only=True)
 class Audit:
-    """What an audit has found.
+    """Result of an audit.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class Audit:
     hypotheses : all that were fitted, what leaves least first; none where all is right
     cause : the hypotheses that explain what is wrong and that the noise cannot separate; one: it is named
     step_order : how drifts go with the integrator's step; None where the runs do not tell
-    notes : what else is to be said
+    notes : caveats, in words
 
     Examples
     --------
@@ -185,7 +185,7 @@ class Audit:
 
     @property
     def wrong(self) -> bool:
-        """Whether a run breaks a law by more than noise and tolerance; neither right nor wrong: it cannot be told."""
+        """True where a run breaks a law by more than noise and tolerance; else samples may hide it."""
         return not all(run.right for run in self.runs)
 
     @property

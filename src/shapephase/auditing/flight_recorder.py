@@ -106,7 +106,7 @@ def assert_right_in_flight(
     tolerance: float = 1e-3,
     flight: str | Sequence[float] = "auto",
 ) -> None:
-    """Nothing where the trajectories are right, else, or where that cannot be told, an AssertionError with the table.
+    """Raise an AssertionError with the table unless the trajectories are right; also where the samples cannot decide.
 
     Raises
     ------

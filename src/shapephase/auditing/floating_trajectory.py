@@ -78,7 +78,7 @@ class FloatingTrajectory:
     joint_order : of arrays without names, in which order their joints were taken, in words; None: they had names
     certain : what the format of its file leaves no doubt about, which is no hypothesis: "units" of the joints, "order"
         of the base's quaternion, "direction" of its attitude
-    captured : whether a format says so in which people are recorded: places of such are known to a centimetre
+    captured : whether the format is one of motion capture, whose places are known to a centimetre
     noise : of the samples before they were filtered, which no longer show it; None: they show it
 
     Examples

@@ -85,7 +85,7 @@ class Hypothesis:
     share : of the rms without any hypothesis
     parameters : how many numbers were fitted for it
     values : what they are
-    remark : what else is to be said
+    remark : a caveat, in words
     leftover : residuals of each law
     residuals : (M,) what is left over in time, in units of the noise: of each run the momentum of its samples, then the
         fall; None where the hypothesis has other samples

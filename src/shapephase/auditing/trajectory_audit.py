@@ -75,7 +75,7 @@ def audit(
     noise: TrajectoryNoise | None = None,
     every: int | None = None,
 ) -> Audit:
-    """Look whether trajectories obey the laws of a free body, and what explains it if they do not.
+    """Check trajectories against the laws of a free body, and find what explains a difference.
 
     In the air the angular momentum about the centre of mass is constant, the centre of mass goes along a parabola, and
     the rates are those of the configurations. A trajectory is right where all three hold within its own noise or

@@ -57,8 +57,9 @@ MotionArgument = Annotated[
     str,
     Parameter(
         allow_leading_hyphen=True,  # standard input is a hyphen
-        help="The motion of its joints: a file (CSV, Excel, Parquet, NPZ, MATLAB, HDF5, OpenSim, C3D, ROS, MuJoCo "
-        "qpos), `-` for standard input, or a name from `shapephase robots`; for example `fall.csv` or `cat_righting`.",
+        help="The motion of its joints: a file (CSV, Excel, Parquet, NPZ, MATLAB, HDF5, OpenSim, BVH, C3D, MVNX, ROS, "
+        "MuJoCo qpos), `-` for standard input, or a name from `shapephase robots`; for example `fall.csv` or "
+        "`cat_righting`.",
     ),
 ]
 Moments = Annotated[

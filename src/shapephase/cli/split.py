@@ -108,6 +108,8 @@ def split_command(
             lines, data = recorded_base_text(flown.motion, flown.recorded)
         else:
             lines, data = fit_lines(flown.fitted, bars), fit_data(flown.fitted)
+        turns = turn_counts(flown.motion, result)
+        bar_lines = error_bar_lines(result, bars, flown.recorded, errors, turns)
         times = np.linspace(0.0, flown.motion.duration, _ROWS)
         write_file(out, flown.motion.save)
         write_file(samples, lambda file: export_motion(flown.motion, file, links=link_momenta))
@@ -122,19 +124,18 @@ def split_command(
                 shape_path=flown.path,
                 title=f"{flown.body.name} along {Path(motion).name}",
                 up=recording.up or flown.up,
-                error_bars=error_bar_lines(result, bars, flown.recorded, errors),
+                error_bars=bar_lines,
                 recording=[*lines, *recording_lines(flown.body, flown.recorded)],
                 noise=joint_noise(flown.body, errors),
                 progress=work.watch,
             )
             write_file(html, page.write)
-    turns = turn_counts(flown.motion, result)
     gap = path_gap(flown.body, in_joint_order(flown.body, flown.path))
     open_by = "" if result.is_loop else f"{gap_text(flown.body, gap)} from its start"
     text = [
         *split_lines(result, split_heading(flown.body, motion, flown.motion), open_by),
         *wrapped(str(turns)),
-        *error_bar_lines(result, bars, flown.recorded, errors),
+        *bar_lines,
         *lines,
         *recording_lines(flown.body, flown.recorded),
     ]

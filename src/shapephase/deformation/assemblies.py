@@ -272,7 +272,7 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     Raises
     ------
     TrajectoryError
-        If the paths last differently, or nothing says how long the motion lasts.
+        If the paths last differently, or no part has a duration.
     SingularInertiaError
         If all mass is on one line at some time, which the message names.
 

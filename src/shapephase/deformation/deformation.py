@@ -318,14 +318,15 @@ def articulated(
     long the motion takes: `split` states it apart from the holonomy. A wheel among the joints of the path is part of
     the shape: it turns by given angles, whatever the pace.
 
+    `rotors` and `rotor_speeds` take a number, which stays, or what a motor makes of it in time: a pair of times (K,)
+    [s] from the start of the path to its end and values (K,), joined by `ShapePath.spline`, or a `ShapePath` of one
+    column.
+
     Parameters
     ----------
     rotors : for each such joint p = J (a . omega_link + spin), the momentum of its wheel along the axle a, with the
         turn of the wheel in space [kg m^2/s]; `inertia` is then that which Routh's reduction leaves, I - J a a^T
     rotor_speeds : or the speed of the wheel on its axle [rad/s]
-
-    Both take a number, which stays, or what a motor makes of it in time: a pair of times (K,) [s] from the start of the
-    path to its end and values (K,), joined by `ShapePath.spline`, or a `ShapePath` of one column.
 
     Raises
     ------
@@ -410,6 +411,9 @@ def prescribed(
 ) -> Deformation:
     """A deformation given by functions of time.
 
+    The shape is taken to be a loop when the inertia at the end is that at the start, to 1e-9. Before they are
+    integrated the functions are scanned once (`Deformation.scan`, which has its own errors and warnings).
+
     Parameters
     ----------
     inertia : times (N,) -> (N, 3, 3) [kg m^2], symmetric positive definite
@@ -419,9 +423,6 @@ def prescribed(
     on_unphysical : what to do with tensors that break the triangle inequality, as no distribution of mass does:
         "allow" them, "warn" or "error". The last two search all times when the deformation is made, and "error" checks
         whatever is evaluated later, too. The equations of motion need only positive definite tensors
-
-    The shape is taken to be a loop when the inertia at the end is that at the start, to 1e-9. Before they are
-    integrated the functions are scanned once (`Deformation.scan`, which has its own errors and warnings).
 
     Raises
     ------
@@ -466,6 +467,10 @@ def particles(
 ) -> Deformation:
     """A body of point masses that move in a known way as seen from a frame.
 
+    The shape is a loop when the particles at the end are those at the start turned by some rotation, which
+    is then the closure. A function is scanned once before it is integrated (`Deformation.scan`, which has its own
+    errors and warnings): velocities that are not those of the positions are refused.
+
     Parameters
     ----------
     masses : (m,) [kg], positive, two or more
@@ -474,10 +479,6 @@ def particles(
         last sample equals the first to 1e-9, else not-a-knot; the first time is shifted to 0). Need not be centred
     duration : [s]; of samples it is known
     breaks : interior times where a derivative jumps [s]
-
-    The shape is a loop when the particles at the end are those at the start turned by some rotation, which
-    is then the closure. A function is scanned once before it is integrated (`Deformation.scan`, which has its own
-    errors and warnings): velocities that are not those of the positions are refused.
 
     Raises
     ------

@@ -19,6 +19,7 @@ from ..deformation.rotors import Rotor
 from ..display import frozen
 from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
+from ..phases.whole_turns import count_slopes
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples
@@ -63,6 +64,8 @@ class Uncertainty:
     dynamic_phase, solid_angle, montgomery_phase : standard deviations [rad]
     start : (6, 6) covariance of the turn of the start, base axes [rad^2], and of the momentum [(kg m^2/s)^2], with all
         that moves a fit to a recording
+    somersaults, twists : standard deviations of an athlete's counts by `turn_counts`, about the same axes
+        [revolutions]; None of another body, and where the tilt at an end is a right angle
     total_angle, holonomy_angle, wheel_angle : standard deviations of the angles of these rotations [rad]; NaN where an
         angle is less than five of them from 0 or from 180 degrees: one number cannot state it there
     smoothing_bias : by how much smoothing has shifted the result that it shifts most, as far as that is known, in
@@ -85,6 +88,8 @@ class Uncertainty:
     wheel_angle: float
     smoothing_bias: float = 0.0
     draws: int = 0
+    somersaults: float | None = None
+    twists: float | None = None
 
 
 @overload
@@ -179,14 +184,19 @@ def uncertainty(
     derived = derivatives(motion)
     covariances = [np.zeros((3, 3)) for _ in _ROTATIONS]
     variances, of_start = np.zeros(len(_PHASES)), np.zeros((UNKNOWNS, UNKNOWNS))
+    counting, of_counts = count_slopes(motion), np.zeros((2, 2))
     for cause in _causes(derived, inputs):
         for total, name in zip(covariances, _ROTATIONS, strict=True):
             total += carried(getattr(cause.derivative, name), cause.covariance)
         variances += [carried(getattr(cause.derivative, name)[None], cause.covariance)[0, 0] for name in _PHASES]
         of_start += carried(cause.start, cause.covariance)
+        if counting is not None:
+            ends = np.vstack([cause.derivative.final_attitude, cause.start[:3]])
+            of_counts += carried(counting @ ends, cause.covariance)
     deviations = np.sqrt(variances)
     bias = 0.0 if inputs.samples is None else _smoothing_bias(derived, covariances, deviations)
-    return _uncertainty(split(motion), covariances, deviations, of_start, smoothing_bias=bias, draws=0)
+    counts = None if counting is None else of_counts
+    return _uncertainty(split(motion), covariances, deviations, of_start, counts, smoothing_bias=bias, draws=0)
 
 
 def sampled_uncertainty(
@@ -262,7 +272,10 @@ def sampled_uncertainty(
             turns[which, row] = so3.log(rotation @ usual.T)
         phases[row] = angles
     covariances = [np.cov(vectors, rowvar=False) for vectors in turns]
-    return _uncertainty(middle, covariances, phases.std(axis=0, ddof=1), np.cov(changes, rowvar=False), draws=draws)
+    counting = count_slopes(motion)
+    counts = None if counting is None else np.cov(np.hstack([turns[0], changes[:, :3]]) @ counting.T, rowvar=False)
+    of_start = np.cov(changes, rowvar=False)
+    return _uncertainty(middle, covariances, phases.std(axis=0, ddof=1), of_start, counts, draws=draws)
 
 
 def _results_of_draw(
@@ -394,15 +407,14 @@ def _uncertainty(
     covariances: list[Array],
     deviations: Array,
     start: Array,
+    counts: Array | None,
     *,
     draws: int,
     smoothing_bias: float = 0.0,
 ) -> Uncertainty:
     _, total, holonomy, _, wheels, _ = covariances
-    bars = (
-        angle_bar(parts.total_rotation, total),
-        angle_bar(parts.holonomy, holonomy),
-        angle_bar(parts.wheel_rotation, wheels),
-    )
-    numbers: list[Any] = [*covariances, *deviations.tolist(), start, *bars, smoothing_bias, draws]
+    rotations = parts.total_rotation, parts.holonomy, parts.wheel_rotation
+    bars = map(angle_bar, rotations, (total, holonomy, wheels))
+    turns = (None, None) if counts is None else np.sqrt(np.diag(counts)).tolist()
+    numbers: list[Any] = [*covariances, *deviations.tolist(), start, *bars, smoothing_bias, draws, *turns]
     return Uncertainty(*numbers)

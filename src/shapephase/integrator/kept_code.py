@@ -176,4 +176,4 @@ def _trusted_bytes(file: Path) -> bytes:
 @lru_cache(maxsize=1)
 def _announce() -> None:
     """Log, once, why the first results of a process take seconds."""
-    logging.getLogger("shapephase").warning("compiling the innermost loops for this machine, once: some seconds")
+    logging.getLogger("shapephase").warning("compiling loops that are new on this machine: some seconds")

@@ -26,8 +26,8 @@ from .extremals.hamiltonian import checked_metric
 class SmallLoop:
     """Circle of shapes, in the metric of a cost, that turns a body furthest for its length. Made by `small_loop`.
 
-    In the coordinates of the shape it is an ellipse. All that is said of turns and costs holds to first order in the
-    area: the error of a turn is of the order of the radius cubed.
+    In the coordinates of the shape it is an ellipse. Turns and costs hold to first order in the area: the
+    error of a turn is of the order of the radius cubed.
 
     Attributes
     ----------

@@ -79,7 +79,7 @@ class SymbolicBody:
         Returns
         -------
         casadi.Function, r -> (entries, n): row a + rows b holds the gradient of entry [a, b] (columns one after the
-        other, as CasADi stores matrices)
+            other, as CasADi stores matrices)
 
         Raises
         ------

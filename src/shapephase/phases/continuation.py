@@ -49,7 +49,7 @@ def continued_orbits(
 ) -> OrbitBranch:
     """One closed orbit followed through growing, or falling, magnitudes of the momentum.
 
-    Each step foretells the orbit by the exact derivative with respect to the momentum's magnitude, and Newton's method
+    Each step predicts the orbit by the exact derivative with respect to the momentum's magnitude, and Newton's method
     corrects it; a step is shortened until the correction is small against it. The branch ends at a fold, where two
     orbits meet (trace 2) and there are none beyond.
 

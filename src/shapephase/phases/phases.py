@@ -313,12 +313,12 @@ class ArcPhases:
 def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") -> ArcPhases:
     """Return the phases of the arcs of a motion between given times, and their sum.
 
+    All areas are counted from one region that no arc enters, so the arcs add up to the whole, not only modulo 4 pi.
+
     Parameters
     ----------
     times : (K + 1,) increasing [s]; for the loops of a repeated path, the multiples of its period
     gauge : as for `split`
-
-    All areas are counted from one region that no arc enters, so the arcs add up to the whole, not only modulo 4 pi.
 
     Raises
     ------

@@ -14,6 +14,7 @@ from ..arrays import Array
 from ..display import short_repr
 from ..errors import ChartPoleError, ShapeError
 from ..reconstruction import AthleteAxes
+from ..reconstruction.attitude_angles import athlete_slopes
 from ..reconstruction.reconstruction import Motion
 from ..refinement import least_over
 from .phase_split import PhaseSplit
@@ -69,7 +70,7 @@ class AthleteTurns:
         return (
             f"As an athlete: {_count(self.somersaults)} somersaults and {_count(self.twists)} twists (to halves "
             f"{halves[0]:g} and {halves[1]:g}), tilt at most {math.degrees(self.largest_tilt):.1f} degrees "
-            f"at {self.tilt_time:.4g} s{rates} (± {self.error:.0e} turns); {self.axes}."
+            f"at {self.tilt_time:.4g} s{rates} (numerical error {self.error:.0e} turns); {self.axes}."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -146,13 +147,13 @@ class TurnCounts:
         if self.about_momentum:
             sentences.append(
                 "The angle of a rotation does not count whole turns: about its momentum the body turned "
-                f"{_count(self.about_momentum)} times (± {self.error:.0e}; the Montgomery phase)."
+                f"{_count(self.about_momentum)} times (the Montgomery phase; numerical error {self.error:.0e})."
             )
         elif self.rotation_number is not None and self.rotation_axis is not None:
             axis = " ".join(f"{value + 0.0:.6g}" for value in np.round(self.rotation_axis, 9))
             sentences.append(
                 f"The body turns in a plane, about ({axis}), base axes: rotation number {_count(self.rotation_number)} "
-                f"(± {self.error:.0e} turns)."
+                f"(numerical error {self.error:.0e} turns)."
             )
         if self.athlete is not None:
             sentences.append(str(self.athlete))
@@ -243,6 +244,25 @@ def turn_counts(motion: Motion, split: PhaseSplit) -> TurnCounts:
     athlete = None if axes is None else athlete_turns(motion, axes)
     number, axis = _rotation_in_plane(motion)
     return TurnCounts(about, athlete, error if athlete is None else max(error, athlete.error), number, axis)
+
+
+def count_slopes(motion: Motion) -> Array | None:
+    """Return derivatives of somersaults and twists by turns of the last attitude, inertial, and the first, base axes.
+
+    (2, 6) [revolutions per rad], about the same axes; None where nothing is counted or the tilt is a right angle.
+    """
+    check_object(motion, "Motion", "motion")
+    axes = motion.counted_axes()
+    if axes is None:
+        return None
+    known = {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
+    _, tilt, twist = motion.somersault_tilt_twist([0.0, motion.duration], **known)
+    try:
+        slopes = athlete_slopes(tilt, twist)
+    except ChartPoleError:
+        return None
+    first, last = slopes[:, [0, 2]] @ axes.matrices[1].T / _TURN
+    return np.hstack([last @ motion.final_attitude.T, -first])
 
 
 def _times_within_steps(motion: Motion) -> Array:

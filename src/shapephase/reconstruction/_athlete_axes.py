@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import TYPE_CHECKING
@@ -30,9 +31,9 @@ NAMED = {
 """Unit vectors by name."""
 _NO_DIRECTION = 1e-6  # component of a unit vector below which its direction is rounding of measured data
 _SIDES = re.compile(
-    r"(?<![A-Za-z])([Ll]eft|[Rr]ight|LEFT|RIGHT)(?![a-z])|(?<![A-Za-z])([lrLR])(?![A-Za-z])|(Left|Right)|^([lr])(?=[A-Z])"
+    r"(?<![A-Za-z])([Ll]eft|[Rr]ight|LEFT|RIGHT)(?![a-z])|(?<![A-Za-z])([lrLR])(?![A-Za-z])|(Left|Right)|^([lrLR])(?=[A-Z])"
 )
-"""Left or right in the name of a link: left_arm, LeftArm, l_hip, hip_r, rThigh."""
+"""Left or right in the name of a link: left_arm, LeftArm, l_hip, hip_r, rThigh, LHipJoint."""
 _UPPER_LINKS = re.compile(r"(?i)head|skull|neck")
 _LOWER_LINKS = re.compile(r"(?i)foot|feet|toe|shank|calf|tibia|ankle")
 _BY_LINKS = "links named right and left"
@@ -190,20 +191,35 @@ def _upwards(body: Body, shape: Array, axis: Array) -> Array:
 def _from_right_to_left(body: Body, shape: Array) -> Array | None:
     """Unit vector of the sum of the vectors from right to left joints of one trunk: (3,), base axes; None: no pairs."""
     chain = body.chain
-    sides: dict[tuple[int, str], dict[str, int]] = {}
-    for link, (frame, _) in chain.link_frames.items():
-        match = _SIDES.search(link)
-        if match is None or frame == 0:
-            continue
-        which = next(group for group in match.groups() if group)[0].lower()
-        rest = link[: match.start()] + "*" + link[match.end() :]
-        sides.setdefault((chain.parents[frame - 1], rest.lower()), {}).setdefault(which, frame - 1)
-    turns = link_motions(chain, shape[None], np.zeros_like(shape)[None]).turns[0]
-    leftward = [
-        turns[parent] @ (chain.places[pair["l"]] - chain.places[pair["r"]])
-        for (parent, _), pair in sides.items()
-        if len(pair) == 2
-    ]
+    motions = link_motions(chain, shape[None], np.zeros_like(shape)[None])
+    turns = motions.turns[0]
+    origins = motions.places[0] - so3.apply(turns, chain.centres)
+    frames = {frame for frame, _ in chain.link_frames.values()}
+    trunks: dict[int, int] = {}
+
+    def pairs() -> Iterator[tuple[int, list[int], Array]]:
+        """Parent, the two frames, and the vector between their joints."""
+        sides: dict[tuple[int, str], dict[str, tuple[int, Array]]] = {}
+        for link, (frame, _) in chain.link_frames.items():
+            match = _SIDES.search(link)
+            if match is None or frame == 0:
+                continue
+            which = next(group for group in match.groups() if group)[0].lower()
+            rest = (link[: match.start()] + "*" + link[match.end() :]).lower()
+            joint = frame - 1
+            while (parent := chain.parents[joint]) and parent not in frames:  # the first joint of a ball joint's three
+                joint = parent - 1
+            place = origins[parent] + turns[parent] @ chain.places[joint]
+            sides.setdefault((trunks.get(parent, parent), rest), {}).setdefault(which, (frame, place))
+        for (parent, _), pair in sides.items():
+            if len(pair) == 2:
+                yield parent, [frame for frame, _ in pair.values()], pair["l"][1] - pair["r"][1]
+
+    # Skeletons of motion capture have pairs of bones that begin in one point of the trunk: what hangs on them counts.
+    for parent, pair, vector in list(pairs()):
+        if not vector.any():
+            trunks |= dict.fromkeys(pair, parent)
+    leftward = [vector for _, _, vector in pairs()]
     total = np.sum(leftward, axis=0) if leftward else np.zeros(3)
     length = float(np.linalg.norm(total))
     scale = sum(float(np.linalg.norm(vector)) for vector in leftward) or 1.0

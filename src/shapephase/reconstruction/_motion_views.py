@@ -14,10 +14,18 @@ from ..arguments import check_keywords, times_argument
 from ..arrays import Array, finite_array
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
-from ..errors import ChartPoleError, MissingExtraError, ShapeError, ShapePhaseError
+from ..errors import MissingExtraError, ShapeError, ShapePhaseError
 from ..offers import offered
 from ._athlete_axes import AthleteAxes, athlete_axes
-from .attitude_angles import Chart, EulerAngles, RotationVectors, continued_angles, euler_chart, followed
+from .attitude_angles import (
+    Chart,
+    EulerAngles,
+    RotationVectors,
+    athlete_slopes,
+    continued_angles,
+    euler_chart,
+    followed,
+)
 from .motion_record import write_table
 
 _COLUMNS = (
@@ -25,7 +33,6 @@ _COLUMNS = (
     "base_x_m", "base_y_m", "base_z_m",
 )  # fmt: skip
 _ROWS = 201  # of a table, by default
-_AT_POLE = 1e-6  # cosine of the tilt: rates there have no digits left
 _PARTS = 8  # of a step, at which angles are continued: a step turns by less than a radian or so
 
 
@@ -187,17 +194,10 @@ class MotionViews:
         """
         axes = {"lateral": lateral, "longitudinal": longitudinal, "somersault": somersault, "up": up}
         _, tilt, twist = self.somersault_tilt_twist(t, **axes)
-        cosine = np.cos(tilt)
-        if np.any(np.abs(cosine) < _AT_POLE):
-            raise ChartPoleError(
-                "the tilt passes through 90 degrees, where somersault and twist are about one axis, and their rates "
-                "are not defined; take other times, or another longitudinal axis"
-            )
         _, body = self.athlete_axes(**axes).matrices
-        spin = self.angular_velocity(t)
-        forward, left, long = np.moveaxis(so3.apply(np.swapaxes(body, -1, -2), spin), -1, 0)
-        turning = (forward * np.sin(twist) + left * np.cos(twist)) / cosine
-        return turning, forward * np.cos(twist) - left * np.sin(twist), long + turning * np.sin(tilt)
+        spin = so3.apply(np.swapaxes(body, -1, -2), self.angular_velocity(t))
+        turning, tilting, twisting = np.moveaxis(so3.apply(athlete_slopes(tilt, twist), spin), -1, 0)
+        return turning, tilting, twisting
 
     def somersault_errors(
         self: Any,

@@ -15,12 +15,13 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ..errors import unknown_name
+from ..errors import ChartPoleError, unknown_name
 
 _AXES = ("x", "y", "z")
 _TURN = 2.0 * np.pi
 _NEAR = 0.5  # change of a vector between two times over its length: the direction then turns by 30 degrees at most
 _AT_POLE = 1e-10  # rad, about twice the length of such a vector at a pole: the default tolerance of attitudes over ten
+_NO_RATES = 1e-6  # cosine of the tilt: rates there have no digits left
 _SHORTEST = 1e-14  # of the duration: halved intervals are not shorter, or times would coincide
 
 
@@ -197,6 +198,33 @@ def euler_angles(attitudes: Array, sequence: str) -> Array:
     sequence : as for `Motion.euler_angles`
     """
     return EulerAngles(sequence).numbers(continuous(so3.quat_from_matrix(attitudes)), _AT_POLE)
+
+
+def athlete_slopes(tilt: Array, twist: Array) -> Array:
+    """Return rates of somersault, tilt and twist per rate about the frontal, lateral and longitudinal axis.
+
+    Parameters
+    ----------
+    tilt, twist : (...) [rad]
+
+    Returns
+    -------
+    (..., 3, 3)
+
+    Raises
+    ------
+    ChartPoleError
+        Where the tilt is a right angle, to 1e-6 rad.
+    """
+    if np.any(np.abs(np.cos(tilt)) < _NO_RATES):
+        raise ChartPoleError(
+            "the tilt passes through 90 degrees, where somersault and twist are about one axis, and their rates "
+            "are not defined; take other times, or another longitudinal axis"
+        )
+    sine, cosine, zero = np.sin(twist), np.cos(twist), np.zeros_like(twist)
+    turning = np.stack([sine / np.cos(tilt), cosine / np.cos(tilt), zero], axis=-1)
+    along = np.sin(tilt)[..., None] * turning + np.array([0.0, 0.0, 1.0])
+    return np.stack([turning, np.stack([cosine, -sine, zero], axis=-1), along], axis=-2)
 
 
 def euler_chart(sequence: str) -> EulerAngles:

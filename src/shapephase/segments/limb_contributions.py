@@ -155,9 +155,10 @@ class Contributions:
         )
         when = f" at {self.at:.4g} s" if self.of == "tilt" else ""
         unit = f" [{self.unit}]" if self.unit else ""
+        error = f"numerical error {self.error / self.scale:.0e}"
         lines = [
-            f"{self.of}{when} of {self.link}{unit}: {text(self.whole)} ± {self.error / self.scale:.0e}; with all "
-            f"groups {self.baseline} {text(self.none)}",
+            f"{self.of}{when} of {self.link}{unit}: {text(self.whole)} ({error}); with all groups {self.baseline} "
+            f"{text(self.none)}",
             "",
             f"{'':{wide}}{'held':>12}{'alone':>12}{'shared':>18}",
         ]  # fmt: skip

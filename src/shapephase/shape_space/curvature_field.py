@@ -93,7 +93,7 @@ def curvature_on_plane(
     Returns
     -------
     (A, B, 3) base axes [rad per product of the two joints' units]; a small square of side e about a point of the plane,
-    gone round from i to j, turns the body by exp(-e^2 F_ij)
+        gone round from i to j, turns the body by exp(-e^2 F_ij)
 
     Raises
     ------

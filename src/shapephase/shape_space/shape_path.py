@@ -221,13 +221,13 @@ class ShapePath:
     ) -> ShapePath:
         """Path given by a function of times (N,) that returns shapes (N, n) and rates (N, n).
 
-        Parameters
-        ----------
-        breaks : interior times where a derivative jumps [s]; the function is evaluated just inside them
-
         Before a body follows it, the path is sampled once at some 5,500 times (`scan`). Features wider than 1/2,000 of
         the duration are found; a narrower one that leaves the shape as it was has to be declared as a break. Kinks are
         located and taken as breaks, with a warning.
+
+        Parameters
+        ----------
+        breaks : interior times where a derivative jumps [s]; the function is evaluated just inside them
 
         Raises
         ------

@@ -1,5 +1,7 @@
 """Smoothing: a linear map whose bias is known, the noise goes and the motion stays, also where a recording ends."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
@@ -285,6 +287,18 @@ def test_a_joint_below_its_noise_is_told_and_a_whole_motion_refused():
         smoothed_path(t, shapes, np.full(2, 0.01), True, NAMES)
     with pytest.raises(TrajectoryError, match="hip"):
         smoothed_path(t, shapes, np.full(2, 10.0), False, NAMES)
+
+
+def test_joints_below_their_noise_are_one_warning_and_a_ball_joint_is_one_joint():
+    rng, t = np.random.default_rng(4), np.linspace(0.0, 3.0, 300)
+    still = 0.003 * rng.normal(size=(300, 3))
+    neck = np.column_stack([still, np.sqrt(1.0 - np.sum(still**2, axis=1))])
+    shapes = np.column_stack([loop(t)[0][:, 0], neck, 0.009 * rng.normal(size=300)])
+    names = ("hip", "neck.x", "neck.y", "neck.z", "neck.w", "knee")
+    with pytest.warns(TrajectoryWarning) as caught:
+        smoothed_path(t, shapes, np.full(6, 0.01), False, names)
+    (said,) = (str(warning.message) for warning in caught)
+    assert re.search(r"of 2 joints: neck \(by 0\.003\d*\), knee \(by 0\.009\d*\)$", said)
 
 
 def test_a_straight_line_is_kept_as_it_is():

@@ -22,9 +22,10 @@ from ..wheels import momentum_word, speed_word
 if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
     from ...error_bars.recorded_momentum import RecordedMomentum
+    from ...phases.whole_turns import TurnCounts
 
 _DIGITS = 2  # of a bar; the number before it ends where the bar does
-_NO_BAR = 1e-12  # [of the angle, or of a degree] a smaller bar is rounding
+_NO_BAR = 1e-9  # [of the angle, or of a degree] a smaller bar is rounding
 
 
 def error_bars(
@@ -85,10 +86,12 @@ def error_bar_lines(
     found: Uncertainty | None,
     recorded: RecordedMotion | None = None,
     options: ErrorOptions = ERROR_DEFAULTS,
+    turns: TurnCounts | None = None,
 ) -> list[str]:
     """Return lines with angles and their bars in degrees, or where an angle has none the largest error of the rotation.
 
-    For a recording without a stated noise, the line says which errors the bars or the table contain.
+    Counts of an athlete follow in revolutions. For a recording without a stated noise, the line says which errors the
+    bars or the table contain.
     """
     if found is None:
         if recorded is None:
@@ -111,12 +114,16 @@ def error_bar_lines(
             ("  dynamic phase", result.dynamic_phase, found.dynamic_phase),
             ("  geometric phase", result.geometric_phase, found.solid_angle),
         ):
-            lines.append(f"{name:24}{_with_bar(float(phase), bar)} deg")
+            lines.append(f"{name:24}{_degrees_with_bar(float(phase), bar)}")
     elif result.has_phase:
         lines.append("phases: error bars need the horizontal gauge (--gauge horizontal)")
+    if turns is not None:
+        for name in ("somersaults", "twists"):
+            count, bar = getattr(turns, name), getattr(found, name)
+            lines += [] if count is None or bar is None else [f"{name:24}{_with_bar(count, bar)} turns"]
     flown = recorded if recorded is not None and recorded.flight is not None else None
     if flown is not None and flown.base_attitude is not None and not (flown.smoothing or options.joint_noise):
-        lines.append(f"{'± of the recorded base':24}only; give --joint-noise (0.3deg) for the noise of the joints")
+        lines.append(f"{'noise of the joints':24}not in the bars; state it, as --joint-noise 0.3deg")
     if found.smoothing_bias:
         lines.append(f"{'smoothing bias':24}at most {found.smoothing_bias:.2g} sigma, in the bars")
     return lines
@@ -129,15 +136,19 @@ def error_bar_data(found: Uncertainty | None) -> dict[str, Any]:
 
 def _rotation_line(name: str, rotation: Array, bar: float, covariance: Array) -> str:
     if math.isfinite(bar):
-        return f"{name:24}{_with_bar(float(so3.angle(rotation)), bar)} deg"
+        return f"{name:24}{_degrees_with_bar(float(so3.angle(rotation)), bar)}"
     widest = math.degrees(math.sqrt(max(float(np.linalg.eigvalsh(covariance)[-1]), 0.0)))
     return f"{name:24}no bar of an angle this near 0 or 180 degrees; error {widest:.2g} deg about the worst axis"
 
 
-def _with_bar(angle: float, bar: float) -> str:
-    """Return an angle and its bar in degrees, ending at the same digit."""
+def _degrees_with_bar(angle: float, bar: float) -> str:
     angle, bar = math.degrees(angle), math.degrees(bar)
     if bar < _NO_BAR * max(angle, 1.0):
-        return f"{angle:16.6f} ± 0"
-    digits = max(_DIGITS - 1 - math.floor(math.log10(bar)), 0)
-    return f"{angle:16.{digits}f} ± {bar:.{digits}f}"
+        return f"{angle:16.6f} deg, not changed by these errors"
+    return f"{_with_bar(angle, bar)} deg"
+
+
+def _with_bar(value: float, bar: float) -> str:
+    """Return a number and its bar, ending at the same digit."""
+    digits = max(_DIGITS - 1 - math.floor(math.log10(max(bar, _NO_BAR))), 0)
+    return f"{value:16.{digits}f} ± {bar:.{digits}f}"

@@ -145,7 +145,10 @@ def shoot(
     AccuracyNotReached
         If it does not converge: the message holds the remaining distance. Plans of bodies of up to 36 joints are near
         enough from 20 pieces on, except where light joints whirl.
-    Errors of `extremal` and `wong_residual`.
+
+    Notes
+    -----
+    Raises also the errors of `extremal` and `wong_residual`.
 
     Examples
     --------

@@ -116,7 +116,8 @@ def conjugate_locus(
 ) -> ConjugateLocus:
     """The conjugate locus of a point: all conjugate points of an order, and its cusps.
 
-    Raises ShapeError as `conjugate_points`; or for fewer than 8 directions.
+    A cusp is where the conjugate time is extremal as the direction varies; two of them between neighbouring directions
+    are missed. Raises ShapeError as `conjugate_points`; or for fewer than 8 directions.
 
     Parameters
     ----------
@@ -124,9 +125,6 @@ def conjugate_locus(
         of them along an axis of symmetry; or (N,) ascending angles [rad]
     order : from 1
     latitude : of the point
-
-    A cusp is where the conjugate time is extremal as the direction varies; two of them between neighbouring directions
-    are missed.
 
     Examples
     --------

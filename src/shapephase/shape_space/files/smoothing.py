@@ -399,10 +399,15 @@ def _check_signal(shapes: Array, noise: Array, joint_names: Sequence[str]) -> No
             f"no joint moves more than its noise level (joint {joint_names[int(spread.argmax())]} most, by "
             f"{spread.max():.6g} rms); nothing of the motion would be left. The level is in rad or m"
         )
-    for joint in map(int, np.flatnonzero(drowned)):
+    balls = ball_columns(joint_names)
+    in_balls = {column for ball in balls for column in range(ball.start, ball.stop)}
+    groups = [(str(joint_names[ball.start]).removesuffix(".x"), ball) for ball in balls]
+    groups += [(name, slice(k, k + 1)) for k, name in enumerate(joint_names) if k not in in_balls]
+    still = [f"{name} (by {spread[columns].max():.3g})" for name, columns in groups if drowned[columns].all()]
+    if still:
         warn(
-            f"joint {joint_names[joint]} moves by {spread[joint]:.6g} rms about its mean, no more than the noise level "
-            f"{noise[joint]:.6g} (both in rad or m): its motion cannot be told from noise"
+            f"motion that cannot be told from noise, in rad or m rms about the mean, of {len(still)} "
+            f"joint{'s' * (len(still) > 1)}: {', '.join(still)}"
         )
 
 

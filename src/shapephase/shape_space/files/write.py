@@ -32,16 +32,14 @@ def write_shape_path(
 ) -> None:
     """Write a joint motion as CSV, TSV or NPZ, by the file's ending; what `read_shape_path` reads.
 
-    A pipe or a device without such an ending gets CSV.
+    A pipe or a device without such an ending gets CSV. Labels of a table have a unit, `[s]` or `[SI]` (rad or m), where
+    `read_shape_path` needs it: for times more than a second apart, and for joints that turn more than two times.
 
     Parameters
     ----------
     times : (N,) of the samples, ascending [s]; None: `path.sample_times`, so that what is read back is the path to 1e-9
         rad or m (of its largest value where that is above 1), a spline as it was
     comment : what stands above the table, each of its lines behind `#`; in NPZ, in the provenance
-
-    Labels of a table have a unit, `[s]` or `[SI]` (rad or m), where `read_shape_path` needs it: for times more than a
-    second apart, and for joints that turn more than two times.
 
     Raises
     ------
