@@ -64,6 +64,7 @@ def test_extended_precision_follows_segments_as_it_follows_the_whole():
         truth.along([loop] * 50, np.array([0.1, 0.3, -0.2]), np.array([50.0]), most_steps=20)
 
 
+@pytest.mark.full
 @needs_compiler
 def test_polynomials_for_the_extended_precision_follow_the_cat():
     """To the rounding of its path, whose roll is the angle of two numbers that nearly vanish together half way."""
@@ -97,6 +98,7 @@ def test_no_error_of_sixty_runs_is_above_its_estimate(family: str):
     assert sum(run.outcome == "done" for run in runs) >= 50
 
 
+@pytest.mark.full
 def test_a_contestant_reconstructs_in_its_own_process_what_is_reconstructed_here():
     """Known and as a black box, to the two estimates, and faults come back as text."""
     case, times = numbered_case(0), np.array([0.3, 1.0])

@@ -40,6 +40,7 @@ def test_steps_of_fourth_order_are_right_in_flight(name: str, acrobat: sp.Body):
     assert run.attitude_error.max() < 2e-4
 
 
+@pytest.mark.full
 def test_dynamics_at_the_nodes_alone_are_no_flight(acrobat: sp.Body):
     """`test_published_flights` of the bodies has biorbd's own momentum of it, half of which comes and goes."""
     found = audited(acrobat, "implicit")

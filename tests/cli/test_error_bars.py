@@ -159,6 +159,7 @@ def test_a_smoothed_recording_has_the_bars_of_its_noise_and_says_what_smoothing_
     assert set(given["recording"]["smoothing"]["penalty_s5"].values()) == {1e-5}
 
 
+@pytest.mark.full
 def test_torques_of_a_recording_have_bars_or_say_that_none_are_known(capfd, take):
     data = json.loads(said(capfd, "torques", "diver", take, *MOMENTUM, "--smooth", "0.2deg", "--json"))
     body = sp.load_body("diver")

@@ -324,6 +324,7 @@ def driven(value: Scalar, slope: Scalar, size: Sequence[float], at: Sequence[flo
     )
 
 
+@pytest.mark.full
 def test_an_assembly_is_looked_at_through_all_its_parts():
     """A mass on a known path, one with a bump, and a boom with a kink, against the same as prescribed functions."""
     known = sp.ShapePath.waypoints([0.0, 1.1, T], [[0.2, 0.0, 1.0], [1.0, 0.5, 0.0], [0.2, 0.0, 1.0]])

@@ -111,6 +111,7 @@ def noisy():
     return sp.reconstruct(sp.articulated(body, path), [0.5, -0.3, 8.0])
 
 
+@pytest.mark.full
 def test_a_minute_of_a_smoothed_recording_takes_hundreds_of_records(spice, noisy, tmp_path):
     """Records follow the error, however many knots the path has."""
     message = sp.exports.write_aem(noisy, tmp_path / "attitude.aem", error=1e-5)

@@ -85,6 +85,7 @@ def at_all_times(body, path, pairs):
     return distances.distance[:, [distances.pairs.index(pair) for pair in pairs]].min(initial=np.inf)
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 @pytest.mark.parametrize("swing", [-0.7, 0.7])
 def test_a_way_back_that_touches_is_not_within_its_limits(gymnast, swing):
@@ -142,6 +143,7 @@ def test_a_plan_keeps_the_legs_of_the_cat_off_its_trunk():
     assert plan.closest[0].links[1] in ("rear_left_lower_leg", "rear_right_lower_leg")
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_a_goal_that_is_not_reached_without_touching_says_which_links_touch(gymnast):
     """The waypoint puts the left arm into the trunk."""

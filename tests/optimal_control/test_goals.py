@@ -91,6 +91,7 @@ def test_groups_are_made_of_their_rotations():
     np.testing.assert_allclose([one.pointing[1] for one in both], [DIRECTION] * 3, atol=1e-15)
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_a_body_that_looks_right_already_does_not_move(two_halves):
     half = turn([1.0, 0.0, 0.0], np.pi)
@@ -119,6 +120,7 @@ def test_a_link_is_pointed_and_its_joints_help(name):
     assert free.cost < shut.cost
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_a_tumbling_body_ends_in_a_steady_spin(two_halves):
     """Its axis of largest inertia along the momentum at the end: as a rigid body it turns about it for ever."""

@@ -161,6 +161,7 @@ def test_coupled_joints_take_the_tightest_limit():
     assert np.all(bends <= most * (1.0 + 1e-6))
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_what_no_motor_can_do_is_told(discs):
     with pytest.raises(PlanNotFound, match="joints"):

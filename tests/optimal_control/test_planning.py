@@ -161,6 +161,7 @@ def test_cat_and_astronaut_from_default_arguments(name, turn):
     assert plan.kkt_residual < 1e-6
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("alpha", "beta"), [pytest.param(*pair, marks=[pytest.mark.full] * (pair[0] != 45)) for pair in RIGHTINGS]
 )
@@ -488,6 +489,7 @@ def test_the_cost_of_another_kind_is_refused():
         path_cost(sp.load_body("cat_two_halves"), kane_scher(0.0, 1.0), "time")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("cost", full_but(["kinetic", "rate"], "kinetic"))
 @pytest.mark.usefixtures("few_guesses")
 def test_a_plan_with_free_rates_is_an_extremal(cost):

@@ -31,6 +31,7 @@ def end_of(plan):
     return pinocchio_motion(plan.body.name, names, path, np.zeros(3), breaks=path.breaks[1:-1]).attitude[-1]
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_waypoints_on_the_best_path_change_nothing(two_halves):
     """With their times, without, and of one joint alone; those that are open are found where they were taken from."""
@@ -94,6 +95,7 @@ def test_least_time_through_a_waypoint(two_halves):
     assert apart(end_of(plan), GOAL) < 1e-8
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_waypoints_within_limits_of_efforts(two_halves):
     """To which the plan comes between the nodes, by torques that know nothing of the program; a link is pointed."""

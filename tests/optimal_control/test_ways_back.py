@@ -50,6 +50,7 @@ def test_all_drifts_of_satellites_are_taken_back(number):
         assert row["cost"] <= row["backwards"] or not row["backwards_keeps"]
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 @pytest.mark.parametrize(
     "cost", ["effort", *(pytest.param(cost, marks=pytest.mark.full) for cost in ("kinetic", "acceleration", "time"))]
@@ -93,6 +94,7 @@ def test_limits_that_the_motion_exceeds_are_kept_by_the_plan():
     assert ways.plan.keeps_limits
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_with_momentum_a_plan_undoes_at_a_given_time():
     motion = swung([0.002, 0.001, -0.002])

@@ -84,6 +84,7 @@ def test_where_both_curves_close_the_body_is_turned_by_the_phase():
     assert found.residual <= found.error_estimate
 
 
+@pytest.mark.full
 def test_a_momentum_that_passes_through_zero_is_refused():
     body = sp.rigid(np.diag([1.0, 1.5, 2.0]), 2.0)
     brake = sp.ExternalTorque(lambda _: [0.0, 0.0, -1.0], "space")

@@ -47,6 +47,7 @@ def test_a_rigid_body_is_counted_about_its_momentum_only():
     assert str(sp.turn_counts(still, sp.split(still))) == ""
 
 
+@pytest.mark.full
 def test_the_command_says_turns_beside_the_angle(capsys):
     command = ["split", "diver", "diver_twist", "--momentum", "0", "61.558831", "0"]
     main(command)

@@ -156,6 +156,7 @@ def test_the_figure_shows_loop_connection_and_numbers(cat):
         assert (field.U[k], field.V[k]) == pytest.approx(tuple(turning), abs=1e-12)
 
 
+@pytest.mark.full
 def test_principal_directions_and_three_joints(cat, halves):
     path = cat_righting().matched(cat.joint_names, cat.name)
     ax = plots.plot_loop(plots.column_axes(5.2), cat, path, "principal", postures=0)

@@ -99,6 +99,7 @@ def test_the_report_of_a_rigid_body_does_not_speak_of_its_shape(tmp_path):
     assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2]
 
 
+@pytest.mark.full
 def test_a_report_shows_each_figure_once(moving_report):
     """Momentum, phases, attitude and joints as curves that move; the others as pictures, in full rows."""
     folder, page, _ = moving_report
@@ -138,6 +139,7 @@ def test_somersault_tilt_and_twist_come_first_of_a_person(tmp_path):
     assert len(drawn) == 6
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("momentum", [True, False])
 def test_the_report_says_what_the_split_says(sweep, tmp_path, momentum, request):
     path, moving, resting = sweep

@@ -93,6 +93,7 @@ def test_both_scenes_run_by_one_clock(chromium, width: int, dive: sp.Motion, tmp
     assert not messages
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("with_body", [True, False])
 def test_the_page_of_the_momentum_runs(chromium, with_body: bool, dive: sp.Motion, tmp_path: Path):
     file, messages = tmp_path / "page.html", []

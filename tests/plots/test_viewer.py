@@ -687,6 +687,7 @@ def test_shapes_are_closed_and_of_their_size(chromium, cat_page):
 # ---- The streams of the process -------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_pages_are_made_in_two_threads_and_the_streams_of_the_process_stay_as_they_are(capfd, tmp_path):
     """Nothing that a third thread prints meanwhile is lost, and nothing else is seen."""
     import rich

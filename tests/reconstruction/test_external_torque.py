@@ -178,6 +178,7 @@ def test_it_writes_a_table_and_refuses_what_it_cannot_do(tmp_path):
         sp.reconstruct(top, np.ones(3), torque=[0.0, 0.0, 1.0])
 
 
+@pytest.mark.full
 def test_the_torque_that_a_free_motion_neglects_is_as_large_as_its_estimate_says():
     """The first-order estimate of a satellite's gravity gradient against the motion with that torque."""
     orbit = sp.bounds.KeplerOrbit.from_state([7.0e6, 0.0, 0.0], [0.0, 7546.05, 0.0], gm=3.986e14)

@@ -73,6 +73,7 @@ def largest_tilt(motion):
     )
 
 
+@pytest.mark.full
 def test_the_published_somersault_with_limbs_held():
     motion = somersault()
     results = [sp.contributions(motion, of, **ATHLETE) for of in ("somersault", largest_tilt, "twist")]

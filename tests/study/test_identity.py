@@ -92,6 +92,7 @@ def test_a_function_that_gives_other_values_is_another_study(tmp_path, what):
     assert len(set(store.values("value").tolist())) == 1
 
 
+@pytest.mark.full
 def test_a_function_that_is_made_anew_is_the_same_study(tmp_path):
     for make in (scaled, with_default, Scaled, lambda factor: partial(times, factor=factor)):
         assert spun(make(3.0)).hash == spun(make(3.0)).hash

@@ -57,6 +57,7 @@ def test_each_file_has_its_momentum_and_outputs(dives):
         assert store.values("arms")[row] == pytest.approx(share_of_the_arms(motion), abs=1e-3)
 
 
+@pytest.mark.full
 def test_a_study_file_reads_each_recording_in_its_own_way(dives, tmp_path):
     (tmp_path / "study.toml").write_text(FILE)
     study = room.read_study("study.toml")

@@ -149,6 +149,7 @@ def test_a_changed_file_is_another_study(tmp_path):
     assert room.Study("cat_two_halves", file, {"momentum": MOMENTUM}).hash != first.hash
 
 
+@pytest.mark.full
 def test_a_disk_that_takes_no_more_is_an_error_and_leaves_a_store_that_goes_on(tmp_path):
     """A process may write files of 2 kB only: the chunks of final attitudes are larger."""
     code = (
