@@ -143,8 +143,8 @@ def _rotation_line(name: str, rotation: Array, bar: float, covariance: Array) ->
 
 def _degrees_with_bar(angle: float, bar: float) -> str:
     angle, bar = math.degrees(angle), math.degrees(bar)
-    if bar < _NO_BAR * max(angle, 1.0):
-        return f"{angle:16.6f} deg, not changed by these errors"
+    if bar < (least := _NO_BAR * max(angle, 1.0)):
+        return f"{angle:16.6f} ± less than {least:.0e} deg"
     return f"{_with_bar(angle, bar)} deg"
 
 
