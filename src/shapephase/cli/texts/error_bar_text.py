@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ...phases.whole_turns import TurnCounts
 
 _DIGITS = 2  # of a bar; the number before it ends where the bar does
-_NO_BAR = 1e-9  # [of the angle, or of a degree] a smaller bar is rounding
+_NO_BAR = 1e-9  # [of the number, or of its unit] a smaller bar is rounding
 
 
 def error_bars(
@@ -120,7 +120,7 @@ def error_bar_lines(
     if turns is not None:
         for name in ("somersaults", "twists"):
             count, bar = getattr(turns, name), getattr(found, name)
-            lines += [] if count is None or bar is None else [f"{name:24}{_with_bar(count, bar)} turns"]
+            lines += [] if count is None or bar is None else [f"{name:24}{_with_bar(count, bar, 'turns')}"]
     flown = recorded if recorded is not None and recorded.flight is not None else None
     if flown is not None and flown.base_attitude is not None and not (flown.smoothing or options.joint_noise):
         lines.append(f"{'noise of the joints':24}not in the bars; state it, as --joint-noise 0.3deg")
@@ -142,13 +142,12 @@ def _rotation_line(name: str, rotation: Array, bar: float, covariance: Array) ->
 
 
 def _degrees_with_bar(angle: float, bar: float) -> str:
-    angle, bar = math.degrees(angle), math.degrees(bar)
-    if bar < (least := _NO_BAR * max(angle, 1.0)):
-        return f"{angle:16.6f} ± less than {least:.0e} deg"
-    return f"{_with_bar(angle, bar)} deg"
+    return _with_bar(math.degrees(angle), math.degrees(bar), "deg")
 
 
-def _with_bar(value: float, bar: float) -> str:
-    """Return a number and its bar, ending at the same digit."""
-    digits = max(_DIGITS - 1 - math.floor(math.log10(max(bar, _NO_BAR))), 0)
-    return f"{value:16.{digits}f} ± {bar:.{digits}f}"
+def _with_bar(value: float, bar: float, unit: str) -> str:
+    """Return a number and its bar, ending at the same digit, or a sentence where the bar is rounding."""
+    if bar < (least := _NO_BAR * max(abs(value), 1.0)):
+        return f"{value:16.6f} {unit}, which these errors change by less than {least:.0e}"
+    digits = max(_DIGITS - 1 - math.floor(math.log10(bar)), 0)
+    return f"{value:16.{digits}f} ± {bar:.{digits}f} {unit}"
