@@ -46,7 +46,7 @@ notebooks:
 # Executes the notebooks too, once, where a number that is not the one committed is an error; then follows every link, and packs
 # the site to be read offline. Needs the extra `docs`.
 docs:
-	$(BIN)/sphinx-build -nW --keep-going docs docs/_build/html
+	$(BIN)/sphinx-build -nW --keep-going -d docs/_build/doctrees docs docs/_build/html
 	PYTHONPATH=docs $(BIN)/python -m _site.built_links docs/_build/html
 	cd docs/_build && $(abspath $(BIN))/python -m zipfile -c shapephase-docs.zip html
 
