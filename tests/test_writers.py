@@ -155,7 +155,7 @@ def small_disk(place, size):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("writer", writers())
+@pytest.mark.parametrize("writer", WRITERS)
 def test_a_full_disk_leaves_the_old_file(writer, folder, write, place):
     target = folder / f"target.{writer.split('.')[1]}"
     assert write(target)["code"] == 0
@@ -215,7 +215,7 @@ def test_what_may_not_be_written_to_stays_as_it_is(writer, folder, write):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("writer", writers())
+@pytest.mark.parametrize("writer", WRITERS)
 def test_what_is_no_file_is_refused_and_stays(writer, folder, write):
     ending = writer.split(".")[1]
     directory, loop, socketed = (folder / f"{name}.{ending}" for name in ("directory", "loop", "socket"))

@@ -64,6 +64,12 @@ def test_bars_of_a_recording_are_those_of_the_library(capfd, take):
     assert number == pytest.approx(np.degrees(found.montgomery_phase), abs=0.1 * bar + 1e-6)
 
 
+def test_what_the_errors_do_not_change_says_by_how_little(capfd, take):
+    """The start's attitude turns no shape: its lift has no bar, which is not the same as none that can be shown."""
+    text = said(capfd, "split", "diver", take, *MOMENTUM, "--attitude-error", "0.01")
+    assert re.search(r"shape (lift|holonomy).* deg, which these errors change by less than \de-\d\d\n", text)
+
+
 @pytest.mark.full
 def test_without_what_is_not_known_there_are_no_bars(capfd, take):
     text = said(capfd, "split", "diver", take, *MOMENTUM)

@@ -132,6 +132,8 @@ def test_draws_of_what_goes_together_scatter_as_the_first_order_says(draws: int,
     for name in ("final_attitude", "total_rotation", "start"):
         ratio = np.sqrt(np.diag(getattr(drawn, name)) / np.diag(getattr(first, name)))
         np.testing.assert_allclose(ratio, 1.0, atol=allowed)
+    for name in ("somersaults", "twists"):
+        assert getattr(drawn, name) == pytest.approx(getattr(first, name), rel=allowed), name
 
 
 def test_what_does_not_go_together(exact: sp.RecordedMomentum):

@@ -69,7 +69,7 @@ def mujoco_torques(name: str, plan: Plan, momentum: Array) -> Array:
 @pytest.mark.parametrize(
     ("cost", "momentum", "limits"),
     [
-        pytest.param("kinetic", 0.0, [0.14, 0.23, 0.03], marks=pytest.mark.full),
+        ("kinetic", 0.0, [0.14, 0.23, 0.03]),
         pytest.param("rate", 0.01, [0.5, 0.2, 0.12], marks=pytest.mark.full),
         pytest.param("effort", 0.0, [0.4, 0.4, 0.015], marks=pytest.mark.full),
         pytest.param("time", 0.0, [0.4, 0.4, 0.015], marks=pytest.mark.full),

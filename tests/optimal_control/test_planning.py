@@ -162,9 +162,7 @@ def test_cat_and_astronaut_from_default_arguments(name, turn):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(
-    ("alpha", "beta"), [pytest.param(*pair, marks=[pytest.mark.full] * (pair[0] != 45)) for pair in RIGHTINGS]
-)
+@pytest.mark.parametrize(("alpha", "beta"), RIGHTINGS)
 def test_no_dearer_than_kane_and_scher(alpha, beta):
     """With the first posture of their righting at both ends, and its own rotation."""
     body = sp.load_body("cat_two_halves")
@@ -490,7 +488,7 @@ def test_the_cost_of_another_kind_is_refused():
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("cost", full_but(["kinetic", "rate"], "kinetic"))
+@pytest.mark.parametrize("cost", ["kinetic", "rate"])
 @pytest.mark.usefixtures("few_guesses")
 def test_a_plan_with_free_rates_is_an_extremal(cost):
     """Wong's equations hold, shooting finds the same optimum, and no conjugate time comes before its end, where the

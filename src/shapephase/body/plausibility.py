@@ -27,7 +27,7 @@ _BEYOND_JOINTS = 0.039 + 0.130  # of the height: below ankles, above the head's 
 
 
 def implausible(body: Body | str) -> tuple[str, ...]:
-    """Return doubts whether a body is real, a sentence for each kind.
+    """Return reasons to doubt that a body is real, a sentence for each kind.
 
     Links that are denser than any matter or lighter than air, by the box of their inertia or by what is drawn of them;
     masses of neighbours that differ ten thousandfold; joints that are not limited although their kind is, or beyond a

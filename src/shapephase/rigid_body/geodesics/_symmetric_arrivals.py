@@ -80,8 +80,7 @@ def have_met(cover: MomentumCover, bounds: FlowBounds, cells: Cells) -> Mask:
         chosen = rows * INSTANTS + best[rows]
         block = replace(cells[rows], time=instants[chosen])
         ends = cell_ends(cover, bounds, block)
-        vector, scalar = ends.quats[:, :3], ends.quats[:, 3]
-        slope = -vector if component == 3 else (so3.hat(vector) + scalar[:, None, None] * np.eye(3))[:, component]
+        slope = so3.quat_product(ends.quats[:, None], np.eye(4)[:3])[..., component]
         spread = sum(np.abs(np.sum(slope * side, axis=-1)) for side in ends.sides) + ends.rest
         spread += np.linalg.norm(ends.fields, axis=(-2, -1)) * ends.bend
         # A quaternion's turn by y is y/2 but for |y|²/8.
