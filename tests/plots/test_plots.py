@@ -145,6 +145,25 @@ def distance_to_chords(point, curve):
     return np.linalg.norm(start + np.clip(share, 0.0, 1.0)[:, None] * step - point, axis=-1).min()
 
 
+class _UnsetMemory:
+    """NumPy whose new arrays hold the largest numbers until they are set."""
+
+    def __getattr__(self, name):
+        return getattr(np, name)
+
+    def empty(self, shape):
+        return np.full(shape, np.finfo(float).max)
+
+
+def test_the_limits_read_no_memory_that_was_never_set(motions, monkeypatch):
+    """Matplotlib stores polygons of different lengths in one array and takes the limits of the axes from all of it."""
+    monkeypatch.setattr("mpl_toolkits.mplot3d.art3d.np", _UnsetMemory())
+    ax = plots.plot_momentum_curve(solid_axes(), motions["cat"], "base")
+    assert np.abs(ax.dataLim.get_points()).max() <= 1.0 + 1e-12
+    ax = plots.plot_caustic(solid_axes(), (4.0, 2.0, 1.0), circles=6)
+    assert np.abs(ax.dataLim.get_points()).max() <= np.pi + 1e-12
+
+
 @pytest.mark.parametrize("gauge", ["horizontal", "principal", "mean_body"])
 def test_the_curve_in_a_gauge_is_the_momentum_in_the_gauged_description(motions, gauge):
     motion = motions["satellite"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Array, Mask, finite_array
 from ._sphere_area import MAX_WINDING, AreaCells, outlines
-from .plot_style import SMALL, finish, finish_below
+from .plot_style import SMALL, add_polygons, finish, finish_below
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,11 +66,9 @@ class ParallelAxes:
         """Fill a polygon (N, 3), or the outline of a convex body with these corners."""
         look = {"facecolor": face, "edgecolor": edge, "linewidth": 0.8, "alpha": 0.6, "zorder": depth}
         if self.solid:
-            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
             # The apex of a cone is the first corner, and its sides are triangles.
             sides = [corners[[0, k, k + 1]] for k in range(1, len(corners) - 1)] if hull else [corners]
-            self.ax.add_collection3d(Poly3DCollection(sides, **look))
+            add_polygons(self.ax, sides, **look)
             return
         from matplotlib.patches import Polygon
 
@@ -216,10 +214,8 @@ class SphereAxes(ParallelAxes):
         depth = 1.5 if near else 1.2
         hatch: dict[str, Any] = {"hatch": "////", "edgecolor": _HATCH[near]} if winding < 0 else {}
         if self.solid:
-            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
             look = {"facecolor": face, "edgecolor": face, "linewidth": 0.3, "gid": gid, "zorder": depth}
-            self.ax.add_collection3d(Poly3DCollection(parts, **look))
+            add_polygons(self.ax, parts, **look)
             hatch = {}
         else:
             paths = [Path(np.vstack([part, part[:1]]) @ self.screen.T, closed=True) for part in outlines(parts)]

@@ -23,7 +23,7 @@ from ..rigid_body.geodesics import (
     serret_andoyer_metric,
     surface_of_metric,
 )
-from .plot_style import BLACK, BLUE, GREY, SERIES, SKY, SMALL, check_axes, check_flat_axes, finish
+from .plot_style import BLACK, BLUE, GREY, SERIES, SKY, SMALL, add_polygons, check_axes, check_flat_axes, finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -308,7 +308,6 @@ def plot_caustic(
     if finite_array(view, "view", (2,), unit="deg").ndim != 1:
         raise ShapeError("view: elevation and azimuth [deg] are needed")
     from matplotlib.patches import Patch
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     space: Any = ax
     metric = left_invariant_metric(moments)
@@ -316,7 +315,7 @@ def plot_caustic(
     velocities = np.sqrt(np.where(np.isfinite(metric.moments), metric.moments, 1.0)) * _directions(polar, around)
     vectors = so3.log(metric.conjugate_locus(metric.unit_speed(velocities @ metric.axes.T), order))
     meshes = _meshes(vectors)
-    space.add_collection3d(Poly3DCollection(meshes, facecolor=SKY, edgecolor=BLUE, linewidth=0.2, alpha=0.3))
+    add_polygons(space, meshes, facecolor=SKY, edgecolor=BLUE, linewidth=0.2, alpha=0.3)
     extent = min(np.pi, max(1.1 * float(np.linalg.norm(vectors, axis=-1).max()), 1e-3))
     if extent == np.pi:
         turn = np.linspace(0.0, 2.0 * np.pi, 121)

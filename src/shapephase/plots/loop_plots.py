@@ -322,7 +322,6 @@ def _draw_space(ax: Any, body: Body, flux: LoopFlux, direction: Array | None, na
     """Draw the loop of three joints and its cone, coloured by the curvature across it."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     points = flux.points[np.linspace(0, len(flux.points) - 1, _SPACE_SECTORS + 1).astype(int)]
     tip = flux.directions @ flux.centre
@@ -335,7 +334,7 @@ def _draw_space(ax: Any, body: Body, flux: LoopFlux, direction: Array | None, na
     largest = float(np.abs(values).max()) or 1.0
     mapped = ScalarMappable(Normalize(-largest, largest), curvature_colours())
     triangles = [[tip, *side] for side in pairwise(points)]
-    ax.add_collection3d(Poly3DCollection(triangles, facecolors=mapped.to_rgba(values), alpha=0.8))
+    style.add_polygons(ax, triangles, facecolors=mapped.to_rgba(values), alpha=0.8)
     ax.plot(*points.T, color=style.BLACK, linewidth=1.6)
     ax.plot(*points[:1].T, marker="*", color=style.GREEN, markersize=10.0, linestyle="none")
     name_axes(ax, flux.joints, flux.units)

@@ -8,6 +8,7 @@ dashes and points by their markers, so that nothing is lost in black and white. 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
@@ -368,6 +369,16 @@ def inset_where_free(ax: Any, extent: tuple[float, float], room: tuple[float, fl
             place = (across + room[0] + 0.5 * _EDGE, up + room[1] + 0.5 * _EDGE)
             return ax.inset_axes((*place, *extent))
     return None
+
+
+def add_polygons(ax: Any, polygons: Sequence[ArrayLike], **look: Any) -> None:
+    """Fill polygons, a sequence of (N_k, 3), in three-dimensional axes."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    # Between polygons of different lengths Matplotlib leaves memory that was never set, and reads limits from it.
+    corners, longest = [np.asarray(polygon) for polygon in polygons], max(map(len, polygons))
+    equal = [np.pad(polygon, ((0, longest - len(polygon)), (0, 0)), mode="edge") for polygon in corners]
+    ax.add_collection3d(Poly3DCollection(np.stack(equal), **look))
 
 
 def _extent(artist: Any) -> Any:
