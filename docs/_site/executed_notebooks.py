@@ -56,10 +56,18 @@ def write(notebook: Any, path: Path) -> None:
 
 
 def quiet_kernels(folder: Path) -> None:
-    """Start kernels with settings of their own, not the user's; what they say of their transport is no warning."""
+    """Start kernels with settings of their own, not the user's.
+
+    Neither what they say of their transport is a warning, nor what the library logs: that it compiles on a new machine.
+    """
     profile = folder / "profile_default"
     profile.mkdir(parents=True, exist_ok=True)
-    (profile / "ipython_kernel_config.py").write_text("get_config().Application.log_level = 40\n", encoding="utf-8")
+    settings = [
+        "c = get_config()",
+        "c.Application.log_level = 40",
+        "c.IPKernelApp.exec_lines = ['import logging', 'logging.getLogger(\"shapephase\").setLevel(logging.ERROR)']",
+    ]
+    (profile / "ipython_kernel_config.py").write_text("\n".join(settings) + "\n", encoding="utf-8")
     os.environ["IPYTHONDIR"] = str(folder)
 
 
