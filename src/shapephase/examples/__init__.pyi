@@ -40,13 +40,7 @@ from .scenarios import (
     named_motion,
     satellite_sweep,
 )
-from .slow_deformation import (
-    adiabatic_precession,
-    first_loop,
-    orbit_of_area,
-    slow_antenna,
-    slow_phase_slope,
-)
+from .slow_deformation import first_loop, slow_antenna
 
 __all__ = [
     "CLOSED_ORBITS",
@@ -59,7 +53,6 @@ __all__ = [
     "Scale",
     "SteadyTurn",
     "TimeReparametrisedRigid",
-    "adiabatic_precession",
     "antenna_deployment",
     "astronaut",
     "astronaut_arm_circles",
@@ -82,12 +75,10 @@ __all__ = [
     "linked_pentagon",
     "named_example",
     "named_motion",
-    "orbit_of_area",
     "printed_antenna",
     "pulsation",
     "regime_crossing",
     "rigid_body",
     "satellite_sweep",
     "slow_antenna",
-    "slow_phase_slope",
 ]
