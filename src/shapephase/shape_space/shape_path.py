@@ -62,8 +62,26 @@ from .scan.scanning import scanned
 _WHOLE_TURN = 2.0 * np.pi
 
 
-class PathOrigin(Protocol):
-    """Steps from recorded samples, smoothed, resampled or closed, to a path."""
+class SampleOrigin(Protocol):
+    """Steps from recorded samples, closed, smoothed or resampled, to values at the knots of a path."""
+
+    @property
+    def samples(self) -> Array:
+        """Samples as they were recorded: (N, n) [rad or m]."""
+        ...
+
+    @property
+    def bias(self) -> Array:
+        """Known bias of smoothing: (knots, n) [rad or m]."""
+        ...
+
+    def by_samples(self, by_values: Array, /) -> Array:
+        """Convert m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        ...
+
+    def bias_by_samples(self, by_values: Array, /) -> Array:
+        """Convert m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        ...
 
     def path(self, samples: Array, /) -> ShapePath:
         """Return the path that the same steps make of other samples (N, n)."""
@@ -107,7 +125,7 @@ class ShapePath:
     sha256: str | None = None
     record: Mapping[str, Any] | None = None
     scanner: Callable[[], FunctionScan] | None = None
-    origin: PathOrigin | None = None
+    origin: SampleOrigin | None = None
     _seen: KeptValues = field(default_factory=KeptValues, init=False, repr=False)
 
     __repr__, _repr_html_ = card_text, card_html
