@@ -110,26 +110,6 @@ def test_a_loaded_motion_is_split_alike(pair, gauge: str):
     assert theirs.shape_gap == ours.shape_gap
 
 
-def test_a_loaded_motion_has_its_inertia(pair):
-    motion, loaded = pair
-    inertia = motion.deformation.inertia(TIMES)
-    np.testing.assert_allclose(loaded.deformation.inertia(TIMES), inertia, rtol=0, atol=1e-8 * np.abs(inertia).max())
-    momentum = motion.deformation.internal_momentum(TIMES)
-    scale = np.abs(momentum).max() + np.abs(inertia).max()
-    np.testing.assert_allclose(loaded.deformation.internal_momentum(TIMES), momentum, rtol=0, atol=1e-8 * scale)
-
-
-def test_the_principal_split_and_a_second_file(tmp_path):
-    motion = motion_of("satellite")
-    motion.save(tmp_path / "first.npz")
-    once = sp.load_motion(tmp_path / "first.npz")
-    once.save(tmp_path / "second.npz")
-    twice = sp.load_motion(tmp_path / "second.npz")
-    assert apart(once.attitude(TIMES), twice.attitude(TIMES)) < 1e-14
-    phases = [sp.split(m, "principal").montgomery_phase for m in (motion, once, twice)]
-    np.testing.assert_allclose(phases, phases[0], rtol=0, atol=1e-8)
-
-
 def test_a_loaded_open_path_is_open(tmp_path):
     path = sp.ShapePath.waypoints([0.0, 1.0], np.stack([np.zeros(23), 0.3 * np.ones(23)]))
     motion = sp.reconstruct(sp.articulated(body_of("cat"), path), [0.0, 0.0, 0.05])
@@ -211,15 +191,6 @@ def test_a_pickle_is_not_opened(tmp_path):
         sp.load_motion(where)
 
 
-@pytest.mark.parametrize("part", [0.1, 0.5, 0.9, 0.999])
-def test_a_truncated_file(saved: Path, tmp_path, part: float):
-    content = saved.read_bytes()
-    where = tmp_path / "cut.npz"
-    where.write_bytes(content[: int(part * len(content))])
-    with pytest.raises(ResultFileError, match=r"cut\.npz"):
-        sp.load_motion(where)
-
-
 def test_any_damaged_byte_is_noticed_or_harmless(saved: Path, tmp_path):
     content, random = saved.read_bytes(), np.random.default_rng(1)
     truth = sp.load_motion(saved).attitude(TIMES)
@@ -286,17 +257,6 @@ def test_a_batch_is_no_recording(tmp_path):
     batch_motion().save(tmp_path / "batch.npz")
     with pytest.raises(TrajectoryError, match=r"batch\.npz.*a batch"):
         sp.read_recorded_motion(tmp_path / "batch.npz", body_of("satellite"))
-
-
-@pytest.mark.parametrize("name", ["spatial_momentum", "closure", "coefficients", "step_quaternions", "hidden"])
-def test_a_changed_number_is_noticed(saved: Path, tmp_path, name: str):
-    """The last bit of one number."""
-    with np.load(saved) as stored:
-        array = stored[name]
-    array.flat[0] = np.nextafter(array.flat[0], np.inf)
-    where = rewritten(saved, tmp_path / "odd.npz", **{name: array})
-    with pytest.raises(ResultFileError, match=r"odd\.npz: the motion is damaged"):
-        sp.load_motion(where)
 
 
 def test_a_file_of_an_earlier_version_has_no_digest(saved: Path, tmp_path):
