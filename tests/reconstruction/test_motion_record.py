@@ -259,6 +259,17 @@ def test_a_batch_is_no_recording(tmp_path):
         sp.read_recorded_motion(tmp_path / "batch.npz", body_of("satellite"))
 
 
+@pytest.mark.parametrize("name", ["spatial_momentum", "closure", "coefficients", "step_quaternions", "hidden"])
+def test_a_changed_number_is_noticed(saved: Path, tmp_path, name: str):
+    """The last bit of one number."""
+    with np.load(saved) as stored:
+        array = stored[name]
+    array.flat[0] = np.nextafter(array.flat[0], np.inf)
+    where = rewritten(saved, tmp_path / "odd.npz", **{name: array})
+    with pytest.raises(ResultFileError, match=r"odd\.npz: the motion is damaged"):
+        sp.load_motion(where)
+
+
 def test_a_file_of_an_earlier_version_has_no_digest(saved: Path, tmp_path):
     with np.load(saved) as stored:
         header = json.loads(str(stored["header"]))
