@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -33,7 +33,6 @@ from .curves import (
     Function,
     Interpolation,
     Joined,
-    KeptValues,
     Multiplied,
     PiecewisePolynomial,
     Reordered,
@@ -124,7 +123,6 @@ class ShapePath:
     sha256: str | None = None
     record: Mapping[str, Any] | None = None
     origin: SampleOrigin | None = None
-    _seen: KeptValues = field(default_factory=KeptValues, init=False, repr=False)
 
     __repr__, _repr_html_ = card_text, card_html
 
@@ -280,10 +278,6 @@ class ShapePath:
         if accelerations is None:
             accelerations = resolved_accelerations(self._scan.resolved, self.loops, times.ravel())
         return accelerations.reshape(*times.shape, self.n_shape)
-
-    def at_samples(self, times: Array) -> tuple[Array, Array]:
-        """Shapes and rates at times at which a body is sampled, read-only: kept for the next momentum or body."""
-        return self._seen(self.curve, times)
 
     @cached_property
     def swings(self) -> Swings:
