@@ -24,7 +24,6 @@ from .example_deformations import (
     rigid_body,
 )
 from .scenarios import (
-    CLOSED_ORBITS,
     MOTIONS,
     NamedMotion,
     antenna_deployment,
@@ -32,7 +31,6 @@ from .scenarios import (
     astronaut_leg_swing,
     cat_righting,
     cat_righting_twist,
-    closed_orbit,
     diver_twist,
     five_stage_dive,
     full_dive,
@@ -43,7 +41,6 @@ from .scenarios import (
 from .slow_deformation import first_loop, slow_antenna
 
 __all__ = [
-    "CLOSED_ORBITS",
     "EXAMPLES",
     "MOTIONS",
     "AxialMotion",
@@ -62,7 +59,6 @@ __all__ = [
     "cat",
     "cat_righting",
     "cat_righting_twist",
-    "closed_orbit",
     "dipole_antenna",
     "diver_twist",
     "expansion",
