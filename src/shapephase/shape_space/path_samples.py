@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -177,9 +178,8 @@ def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
     by_slope[1:] += by_third - by_second
     if periodic:
         by_slope[0] += by_slope[-1]
-        by_mean += _by_means_of_loop(widths, by_slope[:-1])
-    else:
-        by_mean += _by_means(widths, by_slope)
+        by_slope = by_slope[:-1]
+    by_mean += _by_means(widths, by_slope, periodic)
     by_mean /= h
     by_knots[:-1] += by_coefficients[0] - by_mean
     by_knots[1:] += by_mean
@@ -189,60 +189,32 @@ def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
     return by_knots
 
 
-def _by_means(h: Array, by_slopes: Array) -> Array:
-    """Convert derivatives by the slopes at the knots to those by the mean slopes: (pieces + 1, m) -> (pieces, m).
+def _by_means(h: Array, by_slopes: Array, periodic: bool) -> Array:
+    """Convert derivatives by the slopes at the knots to those by the mean slopes: (knots, m) -> (pieces, m).
 
-    Between the ends h_after s_before + 2 (h_before + h_after) s + h_before s_after is 3 (h_after m_before + h_before
-    m_after); the first two pieces, and the last two, are one cubic, of two pieces one parabola, of one a line.
+    At a knot h_after s_before + 2 (h_before + h_after) s + h_before s_after is 3 (h_after m_before + h_before m_after).
+    Without a period the first two pieces, and the last two, are one cubic, of two pieces one parabola, of one a line.
     """
-    pieces = len(h)
-    if pieces == 1:
-        return by_slopes[:1] + by_slopes[1:]
-    before, after = h[:-1], h[1:]
-    diagonal = np.concatenate([[1.0], 2.0 * (before + after), [1.0]])
-    if pieces == 2:
-        # The second derivative at the ends is the one of the whole parabola.
-        next_ones, of_means = (1.0, 1.0), ((2.0, 0.0), (2.0, 0.0))
-    else:
-        ends = (h[0], h[1]), (h[-1], h[-2])
-        diagonal[[0, -1]] = h[[1, -2]]
-        next_ones = tuple(near + far for near, far in ends)
-        of_means = tuple(
-            ((near + 2.0 * (near + far)) * far / (near + far), near * near / (near + far)) for near, far in ends
-        )
-    lower, upper = np.append(after, next_ones[1]), np.append(next_ones[0], before)
-    # In the transposed equations the upper diagonal is the lower one.
-    answers = _tridiagonal(upper, diagonal, lower, by_slopes)
-    by_means = np.zeros((pieces, by_slopes.shape[1]))
-    by_means[:-1] += 3.0 * after[:, None] * answers[1:-1]
-    by_means[1:] += 3.0 * before[:, None] * answers[1:-1]
-    for end, inward, factors in ((0, 1, of_means[0]), (-1, -1, of_means[1])):
-        by_means[end] += factors[0] * answers[end]
-        by_means[end + inward] += factors[1] * answers[end]
-    return by_means
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import splu
 
+    pieces, count = len(h), len(by_slopes)
+    knots = np.arange(count) if periodic else np.arange(1, count - 1)
+    before, after = h[knots - 1], h[knots % pieces]
+    slopes = [(knots, knots - 1, after), (knots, knots, 2.0 * (before + after)), (knots, knots + 1, before)]
+    means = [(knots, knots - 1, 3.0 * after), (knots, knots, 3.0 * before)]
+    for knot, inward in () if periodic else ((0, 1), (count - 1, -1)):
+        piece = 0 if knot == 0 else pieces - 1
+        near, far = h[piece], h[piece + inward] if pieces > 1 else 0.0
+        both = near + far
+        weights = {1: (1.0, 0.0, 1.0, 0.0), 2: (1.0, 1.0, 2.0, 0.0)}
+        own, other, here, there = weights.get(pieces, (far, both, far * (near + 2.0 * both) / both, near**2 / both))
+        slopes += [(knot, knot, own), (knot, knot + inward, other)]
+        means += [(knot, piece, here), (knot, piece + inward, there)]
 
-def _by_means_of_loop(h: Array, by_slopes: Array) -> Array:
-    """`_by_means` of a periodic spline: (pieces, m) -> (pieces, m)."""
-    before = np.roll(h, 1)[:, None]
-    after, diagonal = h[:, None], 2.0 * (h + before[:, 0])
-    # The first and the last equation are coupled, too: the corners are taken off as a product of two vectors, and put
-    # back by the solution for one more right side.
-    corner = -diagonal[0]
-    ends = np.zeros(len(h))
-    ends[0], ends[-1] = corner, h[0]
-    diagonal[0] -= corner
-    diagonal[-1] -= h[0] * h[-2] / corner
-    whole = _tridiagonal(before[:-1, 0], diagonal, after[1:, 0], np.column_stack([by_slopes, ends]))
-    across = whole[0] + h[-2] / corner * whole[-1]
-    answers = whole[:, :-1] - whole[:, -1:] * (across[:-1] / (1.0 + across[-1]))
-    weighted = 3.0 * before * answers
-    return np.roll(3.0 * after * answers, -1, axis=0) + weighted
+    def matrix(entries: list[tuple[Any, Any, Any]], columns: int) -> Any:
+        rows, places, values = (np.concatenate([np.atleast_1d(part) for part in parts]) for parts in zip(*entries))
+        return coo_array((values, (rows, places % columns)), shape=(count, columns))
 
-
-def _tridiagonal(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:
-    """The solution of equations with three diagonals: (k - 1,), (k,), (k - 1,), (k, m) -> (k, m)."""
-    from scipy.linalg import get_lapack_funcs
-
-    (solve,) = get_lapack_funcs(("gtsv",), dtype=np.float64)
-    return np.asarray(solve(lower, diagonal, upper, right)[3], dtype=np.float64)
+    answers = splu(matrix(slopes, count).T.tocsc()).solve(by_slopes)
+    return np.asarray(matrix(means, pieces).T @ answers, dtype=np.float64)
