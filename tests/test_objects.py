@@ -365,7 +365,6 @@ def travellers():
         "rigid": sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0),
         "motion": motion,
         "dop853": sp.reconstruct(deformation, MOMENTUM, method="dop853"),
-        "closed form": sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), [1.0, 2.0, 3.0], method="closed_form"),
         "split": sp.split(motion),
         "fixed points": sp.fixed_points(deformation, 0.02),
         "lift": sp.horizontal_lift(body, path),
