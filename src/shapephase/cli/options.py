@@ -214,7 +214,7 @@ class ColumnOptions:
     """How columns of recorded samples become joints and a base: options of `RecordingOptions` and of `audit`."""
 
     names: Annotated[tuple[str, ...], option(several=True)] = ()
-    """Which column is which joint: COLUMN=JOINT, COLUMN= to ignore a column, or a file of such lines (or of JSON); for
+    """Which column is which joint: COLUMN=JOINT, COLUMN= to ignore a column, or a file of such lines; for
     example `--names LKnee=left_knee frame=` or `--names lab.txt`."""
     degrees: Annotated[bool | None, option(negative="--radians")] = None
     """Turning joints are in degrees, or in radians; default: as the file states. For example `--degrees`."""
