@@ -31,7 +31,6 @@ MOST_LINES = 8
 # Examples that take a second, or half a minute where machine code has to be compiled.
 LONG = (
     "shapephase.compile_steps",
-    "shapephase.examples.closed_orbit",
     "shapephase.plan_reorientation",
     "shapephase.plots.report",
 )

@@ -167,20 +167,6 @@ def test_our_bodies_are_drawn_as_their_files_say(name):
         np.testing.assert_allclose(shape.pose, pose, atol=1e-15)
 
 
-def test_the_drawn_shapes_of_the_cat_have_the_inertia_of_its_links():
-    """Its file says that links are uniform solids of the drawn shapes, to five digits."""
-    body = sp.load_body("cat")
-    parts = {part.links[0]: part for part in body.moving_parts}
-    found = sp.body.visuals(body)
-    single = [shape for shape in found if sum(other.link == shape.link for other in found) == 1]
-    assert len(single) == 13
-    for shape in single:
-        part, turn = parts[shape.link], shape.pose[:3, :3]
-        np.testing.assert_allclose(shape.pose[:3, 3], part.centre, atol=1e-12)
-        solid = turn @ solid_inertia(shape.kind, shape.dimensions, part.mass) @ turn.T
-        np.testing.assert_allclose(solid, part.inertia, rtol=0, atol=2e-4 * np.abs(part.inertia).max())
-
-
 def test_capsules_colours_and_defaults(load_urdf):
     own = '<material name="x"><color rgba="0.1 0.2 0.3 0.4"/></material>'
     shape = "<geometry><capsule radius='0.1' length='0.5'/></geometry>"
@@ -325,14 +311,6 @@ def test_absolute_meshes_and_damaged_ones(tmp_path, load_urdf):
         with pytest.warns(VisualWarning, match="bad.stl"):
             (box,) = shown(body)
         assert box.kind == "box"
-
-
-def test_the_human_of_example_robot_data_has_all_its_meshes():
-    body = sp.load_body("example:human")
-    found = sp.body.visuals(body)
-    root = ElementTree.parse(body.file).getroot()
-    assert sum(shape.kind == "mesh" for shape in found) == sum(1 for _ in root.iterfind("link/visual/geometry/mesh"))
-    assert all(shape.colour != PLAIN for shape in found)
 
 
 def test_the_meshes_of_example_robot_data_are_found_from_elsewhere(tmp_path):

@@ -166,23 +166,6 @@ def test_a_somersault_comes_back(body, somersault, tmp_path):
     assert after.dynamic_phase == pytest.approx(before.dynamic_phase, abs=1e3 * off)
 
 
-def test_the_flight_is_found_between_two_stances(body, somersault, tmp_path):
-    """Frames at rest before and after, as on the ground: the fall along y is cut out, and the same momentum fits."""
-    rows = somersault[-1]
-    stance = 40
-    take = np.concatenate([np.repeat(rows[:1], stance, axis=0), rows, np.repeat(rows[-1:], stance, axis=0)])
-    file = write(tmp_path / "take.bvh", bvh_text(np.round(take, 6), STEP))
-    recorded = sp.read_recorded_motion(file, body, flight="auto", close=False)
-    assert recorded.flight is not None
-    assert recorded.flight.fall is not None
-    assert recorded.flight.fall.up == "+y"
-    first, last = (stance * STEP, (stance + len(rows) - 1) * STEP)
-    assert first - STEP < recorded.flight.first_time < first + 0.1
-    assert last - 0.1 < recorded.flight.last_time < last + STEP
-    # Splines of a part of the samples are others near its ends.
-    np.testing.assert_allclose(fitted(body, recorded).momentum, MOMENTUM, rtol=0, atol=1e-4 * 45.0)
-
-
 WRAPPED = np.array([150.0, 165.0, 179.0, -167.0, -152.0, -139.0, -128.0])
 
 

@@ -371,22 +371,6 @@ def followed(*equalities):
     return mjcf(THREE).replace("</mujoco>", f"<equality>{''.join(equalities)}</equality></mujoco>")
 
 
-def test_a_joint_follows_another_by_a_line(load_mjcf):
-    """From the references of both, and through a third; a slide follows a hinge."""
-    text = followed(
-        '<joint joint1="k" joint2="j" polycoef="0.1 0.5 0 0 0"/>',
-        '<joint joint1="l" joint2="k" polycoef="0.3 -2 0 0 0"/>',
-    )
-    body = load_mjcf(text)
-    assert body.joint_names == ("j",)
-    model = mujoco.MjModel.from_xml_string(text)
-    here = model.qpos0[7:]
-    for value, rate in ((0.4, 1.0), (-0.7, -2.0)):
-        slide = here[1] + 0.1 + 0.5 * (value - here[0])
-        values = [value, slide, here[2] + 0.3 - 2.0 * (slide - here[1])]
-        same_as(body, [value], [rate], truth(model, values, [rate, 0.5 * rate, -rate]))
-
-
 def test_a_joint_follows_another_by_a_polynomial(load_mjcf):
     """A knee that slides as it bends, and a third that follows the slide; one is locked."""
     text = followed(

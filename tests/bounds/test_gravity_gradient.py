@@ -367,9 +367,8 @@ def test_the_estimate_against_the_linear_equation_integrated_otherwise_a16(monke
     assert found.attitude_error == pytest.approx(np.linalg.norm(run.y[3:], axis=0).max(), rel=1e-5)
     assert found.tolerance == 1.0
     monkeypatch.setattr("shapephase.bounds.gravity_gradient._CHUNK", 7)
-    for method in ("closed_form", "dop853"):
-        other = sp.reconstruct(sp.rigid(INERTIA, 6.0), mu, tolerance=1e-9, method=method)
-        assert gravity_torque_estimate(other, orbit).attitude_error == pytest.approx(found.attitude_error, rel=1e-4)
+    other = sp.reconstruct(sp.rigid(INERTIA, 6.0), mu, tolerance=1e-9, method="dop853")
+    assert gravity_torque_estimate(other, orbit).attitude_error == pytest.approx(found.attitude_error, rel=1e-4)
 
 
 def test_is_the_body_free_enough_a16():

@@ -8,18 +8,15 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
-from scipy.optimize import brentq
 
 import shapephase as sp
 from shapephase import so3
 from shapephase.bounds.energy import energy_along
 from shapephase.bounds.regimes import regime_certificate
-from shapephase.errors import AccuracyNotReached, ShapeError, TrajectoryError, UnknownNameError, UnphysicalInertiaError
+from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError, UnphysicalInertiaError
 from shapephase.examples import (
     EXAMPLES,
     Scale,
-    adiabatic_precession,
-    antenna_deployment,
     astronaut,
     axial_as_printed,
     axial_stretch,
@@ -30,18 +27,15 @@ from shapephase.examples import (
     furniture,
     homothety,
     named_example,
-    orbit_of_area,
     printed_antenna,
     pulsation,
     regime_crossing,
     rigid_body,
     slow_antenna,
-    slow_phase_slope,
 )
 from shapephase.inertia_tensor import triangle_defect
 from shapephase.phases.phases import arc_phases
 from shapephase.rigid_body import EulerTop
-from support.long_runs import full_but
 
 # What is computed is the same with and without machine code, which is quicker.
 
@@ -103,7 +97,6 @@ def moments_of(example, times):
 HOMOTHETIES = {
     "pulsation": {},
     "expansion": {"scale": expansion(0.05)},
-    "by quadrature": {"scale": Scale(lambda t: np.exp(0.2 * np.sin(0.7 * t)))},
     "tilted tensor": {"inertia": TILTED, "momentum": TURN @ [0.5, -0.7, -3.0], "scale": pulsation(-0.3, 2.0)},
     "about the smallest moment": {"momentum": (3.5, 0.4, 0.3)},
     "axisymmetric": {"inertia": np.diag([1.0, 1.0, 1.6]), "momentum": (0.8, 0.0, 3.0)},
@@ -118,17 +111,6 @@ def test_a_growing_body_moves_as_the_rigid_one_in_its_own_time_f1(name):
     assert example.phase == example.rigid.montgomery_phase
     assert phase_gap(example.phase, motion) < 1e-10
     assert np.all(example.deformation.internal_momentum(np.linspace(0.0, motion.duration, 9)) == 0.0)
-
-
-@pytest.mark.parametrize("name", HOMOTHETIES)
-def test_the_raw_equations_say_the_same_f1(name):
-    example = homothety(**HOMOTHETIES[name])
-    times = np.linspace(0.0, example.deformation.duration, 21)
-    scale = HOMOTHETIES[name].get("scale") or pulsation()
-    inverse = np.linalg.inv(np.array(HOMOTHETIES[name].get("inertia", np.diag([1.0, 1.5, 2.0]))))
-    attitude, momentum = raw_motion(lambda t: inverse / float(scale.factor(t)) ** 2, example.momentum, times)
-    assert np.abs(example.known.attitude(times) - attitude).max() < 1e-11
-    assert np.abs(example.known.body_momentum(times) - momentum).max() < 3e-11
 
 
 def test_the_phase_is_the_rigid_one_and_the_area_its_own_f1():
@@ -148,16 +130,6 @@ def test_the_clock_is_the_integral_of_the_inverse_square_f1(scale):
             for piece in pairwise(np.linspace(0.0, end, 9))
         )
         assert float(scale.clock(np.array(end))) == pytest.approx(exact, rel=1e-13)
-
-
-def test_the_clock_by_quadrature_f1():
-    known = pulsation(0.7, 1.1)
-    example = homothety(Scale(known.factor), duration=6.0)
-    times = np.linspace(0.0, 6.0, 12).reshape(3, 4)
-    np.testing.assert_allclose(example.known.clock(times), known.clock(times), rtol=0, atol=1e-12)
-    assert example.phase is None
-    with pytest.raises(AccuracyNotReached, match="clock"):
-        homothety(Scale(lambda t: 2.0 + np.sign(np.sin(1e4 * t)) * np.cos(t)), duration=3.0).known.attitude([2.0])
 
 
 def test_a_body_that_expands_for_ever_turns_by_a_finite_angle_f1():
@@ -405,43 +377,10 @@ def test_along_the_largest_moment_the_order_does_not_last_f4b():
     assert np.all(np.diff(moments_of(dipole_antenna(1), times), axis=1) > 0.0)
 
 
-def test_the_boom_of_the_satellite_does_what_the_physical_antenna_does_f4b():
-    """A real boom along x: I_xx stays, the others grow alike, the energy falls, and the order does not last."""
-    body = sp.load_body("satellite")
-    deformation = sp.articulated(body, antenna_deployment(60.0))
-    times = np.linspace(0.0, 60.0, 121)
-    inertia = deformation.inertia(times)
-    added = inertia - inertia[0]
-    assert np.abs(added[:, 0, 0]).max() < 1e-12 * inertia[0, 0, 0]
-    np.testing.assert_allclose(added[:, 1, 1], added[:, 2, 2], atol=1e-12, rtol=0)
-    # Stowed it sticks out behind, so that its centre first comes nearer.
-    nearest = int(np.argmin(added[:, 1, 1]))
-    assert nearest < 30
-    assert np.all(np.diff(added[nearest:, 1, 1]) > 0.0)
-    assert added[-1, 1, 1] > 20.0
-    assert deformation.triangle_defect()[0] < 0.0
-    moments, axes = np.linalg.eigh(inertia[[0, -1]])
-    assert abs(axes[0, 0, 2]) > 0.98
-    assert abs(axes[1, 0, 2]) < 0.25
-    spatial = np.array([20.0, 1.0, 1.0])
-    motion = sp.reconstruct(deformation, np.stack([spatial, [1.0, 20.0, 1.0], [5.0, 5.0, 20.0]]), tolerance=1e-11)
-    momentum = motion.body_momentum(times)
-    values = 0.5 * np.einsum("bni,nij,bnj->bn", momentum, np.linalg.inv(inertia), momentum)
-    assert np.all(values[:, -1] < values[:, 0])
-    thresholds = 0.5 * spatial @ spatial / moments[:, 1]
-    assert values[0, 0] < 0.8 * thresholds[0]
-    assert values[0, -1] > thresholds[1]
-
-
 # ---- F5: slow deformations ------------------------------------------------------------------------------------------
 
-ORBITS = {
-    "default": ((1.0, 1.5, 2.0), (0.4, 0.3, 3.2)),
-    "upside down": ((1.0, 1.5, 2.0), (0.6, 0.5, -3.0)),
-    "wide": ((1.0, 1.4, 2.0), (-0.6, 0.5, 1.0)),
-    "near the separatrix": ((1.0, 1.4, 1.6), (0.2, -0.7, 1.0)),
-    "axisymmetric": ((1.2, 1.2, 1.8), (0.2, -0.7, 1.5)),
-}
+DEFAULT = ((1.0, 1.5, 2.0), (0.4, 0.3, 3.2))
+WIDE = ((1.0, 1.4, 2.0), (-0.6, 0.5, 1.0))
 
 
 def phase_difference(rate, law, moments, momentum):
@@ -456,7 +395,7 @@ def phase_difference(rate, law, moments, momentum):
 def test_the_phase_tends_to_the_rigid_one_over_three_decades_f5(law):
     """First order in the rate in general, second where the rate starts from zero."""
     rates = 10.0 ** np.arange(-2.0, -5.5, -0.5)
-    gaps = np.abs([phase_difference(rate, law, *ORBITS["default"])[0] for rate in rates])
+    gaps = np.abs([phase_difference(rate, law, *DEFAULT)[0] for rate in rates])
     orders = np.log10(gaps[:-1] / gaps[1:]) / 0.5
     expected = 1.0 if law == "even" else 2.0
     assert np.all(np.abs(orders - expected) < 0.03)
@@ -464,127 +403,11 @@ def test_the_phase_tends_to_the_rigid_one_over_three_decades_f5(law):
     assert gaps[0] / gaps[-1] > 10.0 ** (3.0 * expected - 0.1)
 
 
-@pytest.mark.parametrize("name", ORBITS)
-def test_the_first_order_is_the_derived_one_f5(name):
-    """Extrapolated from two rates, against perturbation in Andoyer's variables."""
-    slope = slow_phase_slope(*ORBITS[name])
-    rate = 2e-5
-    measured = [phase_difference(step, "even", *ORBITS[name])[0] / (0.2 * step) for step in (rate, 0.5 * rate)]
-    assert 2.0 * measured[1] - measured[0] == pytest.approx(slope, rel=1e-6)
-
-
 def test_the_loop_closes_along_the_meridian_f5():
-    _, loop = phase_difference(1e-3, "even", *ORBITS["wide"])
+    _, loop = phase_difference(1e-3, "even", *WIDE)
     assert 1e-4 < loop.momentum_gap[0] < 1e-1
-    _, slower = phase_difference(1e-4, "even", *ORBITS["wide"])
+    _, slower = phase_difference(1e-4, "even", *WIDE)
     assert loop.momentum_gap[0] / slower.momentum_gap[0] == pytest.approx(10.0, rel=0.1)
-
-
-def test_half_a_loop_to_either_side_of_a_symmetric_point_leaves_second_order_f5():
-    """The rigid body of the middle of the loop: first orders cancel, so the order is that of the reference."""
-    moments, size = np.array([1.0, 1.5, 2.0]), 3.0
-    start = size * np.array([0.0, np.sin(0.4), np.cos(0.4)])
-    top = EulerTop.principal(moments, start)
-
-    def precession(rate):
-        """The angle of axis 3 about the momentum while Pi goes half round, counted from its side."""
-
-        def slope(u, y):
-            height, time, _ = y
-            across = np.sin(u) ** 2 / moments[0] + np.cos(u) ** 2 / moments[1]
-            low = 1.0 / (moments[2] * (1.0 + rate * time))
-            pace = 1.0 / (height * (across - low))
-            bend = np.sin(u) * np.cos(u) * (1.0 / moments[0] - 1.0 / moments[1])
-            return [(size**2 - height**2) * bend * pace, pace, size * across * pace]
-
-        return solve_ivp(slope, (0.0, np.pi), [start[2], 0.0, 0.0], "DOP853", rtol=3e-14, atol=1e-14).y[2, -1]
-
-    assert 2.0 * precession(0.0) == pytest.approx(top.precession_per_period, abs=1e-11)
-    rates = 10.0 ** np.arange(-2.0, -4.5, -0.5)
-    both = [abs(precession(rate) + precession(-rate) - top.precession_per_period) for rate in rates]
-    one = [abs(2.0 * precession(rate) - top.precession_per_period) for rate in rates]
-    assert np.all(np.abs(np.log10(np.divide(both[:-1], both[1:])) / 0.5 - 2.0) < [0.03, 0.003, 3e-4, 1e-4])
-    assert np.all(np.abs(np.log10(np.divide(one[:-1], one[1:])) / 0.5 - 1.0) < [0.1, 0.03, 0.01, 3e-3])
-
-
-@pytest.mark.parametrize(("law", "order"), full_but([("deployment", 3.0), ("even", 1.0)], ("even", 1.0)))
-def test_after_a_deployment_the_body_has_the_area_it_had_f5(law, order):
-    """From rest to rest by the quintic to third order, evenly to first.
-
-    What the two ends do adds up or cancels, by when they come: the worst of eight starts on half the orbit and of
-    three ends.
-    """
-    end = np.diag([1.0, 1.5, 2.4])
-    seconds = np.array([24.0, 48.0, 96.0])
-    areas, phases = np.zeros((2, 3))
-    for row, duration in enumerate(seconds):
-        for length in duration + np.array([0.0, 1.1, 2.2]):
-            example = slow_antenna(1.0 / length, "deployment")
-            deformation, top = example.deformation, example.rigid
-            np.testing.assert_allclose(deformation.inertia(length), end, atol=1e-14, rtol=0)
-            if law == "even":
-                deformation = sp.prescribed(even_growth(length), None, length)
-            starts = top.body_momentum(np.linspace(0.0, 0.5 * top.period, 9)[:-1])
-            last = sp.reconstruct(deformation, starts, tolerance=1e-9).body_momentum(length)
-            expected = orbit_of_area([1.0, 1.5, 2.4], top.magnitude, top.solid_angle)
-            for late in (EulerTop(end, momentum) for momentum in last):
-                areas[row] = max(areas[row], abs(late.solid_angle - top.solid_angle))
-                phases[row] = max(phases[row], abs(late.montgomery_phase - expected.montgomery_phase))
-            assert abs(expected.montgomery_phase - top.montgomery_phase) > 1.0
-    for gaps in (areas, phases):
-        assert -np.polyfit(np.log(seconds), np.log(gaps), 1)[0] == pytest.approx(order, abs=0.12)
-
-
-def with_internal_momentum():
-    tensor = np.diag([1.0, 1.5, 2.0])
-    return sp.prescribed(lambda t: tensor + 0.0 * t[:, None, None], lambda t: t[:, None] * [0.0, 0.0, 0.1], 2.0)
-
-
-def even_growth(duration):
-    return lambda t: np.diag([1.0, 1.5, 2.0]) + np.diag([0.0, 0.0, 0.4]) * (t / duration)[:, None, None]
-
-
-@pytest.mark.parametrize("law", full_but(["deployment", "even"], "deployment"))
-def test_the_whole_precession_is_that_of_constant_area_to_first_order_f5(law):
-    """Second order a loop: the angle of axis 3 about the momentum grows as 1/rate, its difference falls as the rate."""
-    spatial = 3.0 * np.array([0.0, np.sin(0.4), np.cos(0.4)])
-    seconds = np.array([20.0, 40.0, 80.0, 160.0]) if law == "even" else np.array([80.0, 160.0])
-    gaps, wholes = [], []
-    for duration in seconds:
-        deformation = slow_antenna(1.0 / duration, "deployment", momentum=spatial).deformation
-        if law == "even":
-            deformation = sp.prescribed(even_growth(duration), None, duration)
-        motion = sp.reconstruct(deformation, spatial, tolerance=1e-9)
-        times = np.linspace(0.0, duration, int(40 * duration) + 1)
-        side = motion.body_momentum(times)[:, 0]
-        late = int(np.flatnonzero(side[1:] * side[:-1] < 0.0)[-1])
-        end = brentq(lambda t: motion.body_momentum(t)[0], times[late], times[late + 1], xtol=1e-13)  # noqa: B023
-        times = np.append(times[: late + 1], end)
-        across = np.stack([[1.0, 0.0, 0.0], np.cross(spatial / 3.0, [1.0, 0.0, 0.0])])
-        east, north = across @ motion.attitude(times)[:, :, 2].T
-        turned = np.unwrap(np.arctan2(north, east))
-        wholes.append(turned[-1] - turned[0])
-        gaps.append(abs(wholes[-1] - adiabatic_precession(deformation, spatial, end)))
-    assert gaps[-1] < 1e-3 / 3.0
-    assert wholes[-1] > 370.0
-    assert -np.polyfit(np.log(seconds), np.log(gaps), 1)[0] == pytest.approx(1.0, abs=0.08)
-
-
-def test_the_precession_of_constant_area_goes_over_breaks_and_is_rigid_without_growth_f5():
-    top = EulerTop.principal([1.0, 1.5, 2.0], [0.3, 0.4, 0.9])
-    still = sp.rigid(np.diag([1.0, 1.5, 2.0]), 9.0)
-    assert adiabatic_precession(still, top.momentum, 7.0) == pytest.approx(7.0 * top.precession_frequency, rel=1e-12)
-    example = printed_antenna(3)
-    parts = [adiabatic_precession(example.deformation, example.momentum, t) for t in (5.0, 5.5, 25.0)]
-    coasting = orbit_of_area([1.0, 1.5, 2.4], example.rigid.magnitude, example.rigid.solid_angle).precession_frequency
-    assert np.diff(parts) == pytest.approx([0.5 * coasting, 19.5 * coasting], rel=1e-11)
-
-
-@pytest.mark.parametrize("area", [1e-6, 0.3, 2.5])
-def test_the_orbit_of_an_area_has_it_f5(area):
-    top = orbit_of_area([1.0, 1.5, 2.4], 1.7, area)
-    assert top.solid_angle == pytest.approx(area, abs=1e-12)
-    assert top.magnitude == pytest.approx(1.7, rel=1e-14)
 
 
 # ---- F6: furniture in a spacecraft ----------------------------------------------------------------------------------
@@ -685,22 +508,9 @@ def test_every_example_is_computed_to_1e_12(name):
     ("call", "error", "words"),
     [
         (lambda: named_example("dog"), UnknownNameError, "cat"),
-        (lambda: slow_antenna(1e-3, "fast"), UnknownNameError, "deployment"),
+        (lambda: slow_antenna(1e-3, "fast"), UnknownNameError, "periodic"),
         (lambda: slow_antenna(0.0), ShapeError, "rate"),
         (lambda: slow_antenna(momentum=(3.0, 0.1, 0.1)), ShapeError, "axis 3"),
-        (lambda: slow_phase_slope((1.0, 1.5, 2.0), (3.0, 0.1, 0.1)), ShapeError, "axis 3"),
-        (lambda: slow_phase_slope((2.0, 1.5, 1.0), (0.1, 0.1, 3.0)), ShapeError, "axis 3"),
-        (lambda: orbit_of_area([1.0, 1.5, 2.4], 1.0, 7.0), ShapeError, "sr"),
-        (lambda: adiabatic_precession(furniture().deformation, (0.0, 0.0, 1.0), 1.0), ShapeError, "internal"),
-        (
-            lambda: adiabatic_precession(dipole_antenna().deformation, (0.1, 0.1, 1.0), 20.0),
-            ShapeError,
-            "fixed axes",
-        ),
-        (lambda: adiabatic_precession(with_internal_momentum(), (0.1, 0.1, 1.0), 1.0), ShapeError, "internal"),
-        (lambda: adiabatic_precession(sp.rigid(TILTED, 2.0), (0.1, 0.1, 1.0), 1.0), ShapeError, "fixed axes"),
-        (lambda: adiabatic_precession(printed_antenna(3).deformation, (0.3, 0.4, 0.9), -1.0), ShapeError, "until"),
-        (lambda: slow_phase_slope((1.0, 1.5, 2.0), (1e-9, 1.0, 1e-8)), AccuracyNotReached, "separatrix"),
         (lambda: homothety(inertia=np.diag([1.0, 1.5, 2.6])), UnphysicalInertiaError, "triangle"),
         (lambda: printed_antenna(2), ShapeError, "1 or 3"),
         (lambda: printed_antenna(3, grown=1.9), ShapeError, "above"),
@@ -712,8 +522,8 @@ def test_every_example_is_computed_to_1e_12(name):
         (lambda: pulsation(1.0), ShapeError, "amount"),
         (lambda: homothety(Scale(pulsation().factor, lambda t: t)), TrajectoryError, "clock"),
         (lambda: homothety(Scale(expansion().factor, lambda t: 1.0 + expansion().clock(t))), TrajectoryError, "clock"),
-        (lambda: homothety(Scale(lambda t: t - 1.0), duration=2.0), ShapeError, "above 0"),
-        (lambda: homothety(Scale(lambda t: t[:1] + 1.0), duration=2.0), ShapeError, "shape"),
+        (lambda: homothety(Scale(lambda t: t - 1.0, pulsation().clock), duration=2.0), ShapeError, "above 0"),
+        (lambda: homothety(Scale(lambda t: t[:1] + 1.0, pulsation().clock), duration=2.0), ShapeError, "shape"),
         (lambda: rigid_body(momentum=(0.0, 0.0, 0.0)), TrajectoryError, "period"),
         (lambda: homothety(momentum=(0.0, 1.0, 0.0)), TrajectoryError, "duration"),
         (lambda: first_loop(motion_of(printed_antenna(1, coast=1.0))), TrajectoryError, "degrees"),

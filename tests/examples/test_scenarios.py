@@ -11,17 +11,14 @@ from shapephase import so3
 from shapephase.body.catalog import robots_folder
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.examples import (
-    CLOSED_ORBITS,
     MOTIONS,
     cat_righting,
     cat_righting_twist,
-    closed_orbit,
     diver_twist,
     full_dive,
     kane_scher,
     named_motion,
 )
-from support.long_runs import full_but
 
 # What is computed is the same with and without machine code, which is quicker.
 
@@ -279,25 +276,3 @@ def test_left_and_right_are_mirror_images():
             image[body.joint_index(other)] = value if about_y else -value
         inertia = body.locked_inertia(shape)
         np.testing.assert_allclose(body.locked_inertia(image), mirror @ inertia @ mirror, atol=1e-12, rtol=0)
-
-
-@pytest.mark.parametrize("name", full_but(CLOSED_ORBITS, "satellite"))
-def test_closed_orbits_have_nothing_but_phase_and_holonomy(name):
-    """theory.md section 2: Delta R = exp(theta_M mu^) R_G in the horizontal gauge, exp(theta_M mu^) in the base."""
-    motion = closed_orbit(name)
-    split = sp.split(motion)
-    total = motion.final_attitude @ motion.initial_attitude.T
-    about = so3.exp(np.array([0.0, 0.0, split.montgomery_phase]))
-    assert so3.angle(total.T @ about @ split.holonomy) < 1e-9
-    assert split.momentum_gap < 1e-9
-    based = closed_orbit(name, "base")
-    total = based.final_attitude @ based.initial_attitude.T
-    about = so3.exp(np.array([0.0, 0.0, sp.split(based, "base").montgomery_phase]))
-    assert so3.angle(total.T @ about) < 1e-9
-
-
-def test_closed_orbits_are_known_by_name():
-    with pytest.raises(UnknownNameError, match="astronaut"):
-        closed_orbit("dog")
-    with pytest.raises(UnknownNameError, match="horizontal"):
-        closed_orbit("cat", "principal")

@@ -17,7 +17,7 @@ from shapephase.bounds.energy import energy_along
 from shapephase.bounds.regimes import regime_certificate
 from shapephase.deformation.gauge import named_gauge
 from shapephase.errors import GaugeError, MissingExtraError, ShapeError, UnknownNameError
-from shapephase.examples import MOTIONS, astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
+from shapephase.examples import MOTIONS, astronaut_leg_swing, cat_righting, satellite_sweep
 from shapephase.plots._joint_styles import other_side
 from shapephase.plots._sphere_area import enclosed_cells, outlines
 from shapephase.plots.motion_plots import _pieces
@@ -351,7 +351,8 @@ def test_no_text_stands_on_the_curve(motions):
 
 
 def test_a_closed_curve_has_no_closing_circle():
-    ax = plots.plot_momentum_curve(flat_axes(), closed_orbit("cat", "base"), "base")
+    closed, *_ = sp.closed_orbits(sp.articulated("cat", cat_righting()), 0.005)
+    ax = plots.plot_momentum_curve(flat_axes(), closed, "base")
     assert labels(ax)[:2] == [r"$\Pi/|\Pi|$", "start"]
     assert "closing great circle" not in labels(ax)
     assert len(marked(ax, "s", VERMILION)) == 0

@@ -22,7 +22,6 @@ from shapephase.reconstruction.attitude_angles import (
 TURN = 2.0 * np.pi
 SEQUENCES = ["".join(three) for three in product("XYZ", repeat=3) if three[0] != three[1] != three[2]]
 RIGID = sp.rigid(np.diag([4.0, 3.9, 0.5]), 1.0)
-TIMES = np.linspace(0.0, 1.0, 7)
 
 
 def along(attitude, times, chart, count: int = 40):
@@ -220,18 +219,3 @@ def test_batches_have_axes_of_their_own():
     for row, momentum in enumerate(momenta):
         alone = np.array(sp.reconstruct(RIGID, momentum).somersault_tilt_twist([0.0, 0.7, 1.0], lateral="y"))
         np.testing.assert_allclose(together[:, row], alone, rtol=0, atol=1e-8)
-
-
-def test_angles_do_not_depend_on_those_asked_for_before():
-    """Bit for bit: what is followed for one chart, or for axes of one athlete, is never that of another."""
-    axes = {"lateral": "y", "longitudinal": "z", "somersault": "y", "up": "z"}
-    asked = [
-        lambda motion: motion.rotation_vector(TIMES),
-        lambda motion: motion.euler_angles(TIMES, "ZYX"),
-        lambda motion: np.stack(motion.somersault_tilt_twist(TIMES, **axes), axis=-1),
-        lambda motion: np.stack(motion.somersault_tilt_twist(TIMES, **axes | {"longitudinal": "x"}), axis=-1),
-    ]
-    moving = [sp.reconstruct(RIGID, [3.0, 1.0, 2.0]) for _ in range(len(asked) + 1)]
-    alone = [ask(motion) for ask, motion in zip(asked, moving, strict=False)]
-    for ask, expected in (*zip(asked, alone), *zip(asked[::-1], alone[::-1])):
-        np.testing.assert_array_equal(ask(moving[-1]), expected)

@@ -169,7 +169,7 @@ def test_it_writes_a_table_and_refuses_what_it_cannot_do(tmp_path):
     with pytest.raises(ShapeError, match="motion"):
         sp.reconstruct(top, np.ones((2, 3)), torque=lambda _: np.zeros(3))
     with pytest.raises(UnknownNameError, match="method"):
-        sp.reconstruct(top, np.ones(3), torque=lambda _: np.zeros(3), method="closed_form")
+        sp.reconstruct(top, np.ones(3), torque=lambda _: np.zeros(3), method="spectral")
     with pytest.raises(UnknownNameError, match="axes"):
         sp.ExternalTorque(lambda _: np.zeros(3), "sky")
     with pytest.raises(TrajectoryError):

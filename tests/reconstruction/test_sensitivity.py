@@ -7,9 +7,7 @@ Pinocchio's, against the chain rule and against the symmetric top in closed form
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
-from itertools import product
 
 import numpy as np
 import pytest
@@ -28,7 +26,6 @@ from support.independent import (
     body_of,
     geodesic_turn,
     hat,
-    pinocchio_motion,
     random_loop,
     random_rotation,
     random_vector,
@@ -181,26 +178,6 @@ def test_a_vanishing_momentum_answers_like_none(share: float):
         assert np.linalg.norm(0.5 * (first + second) - rest) < near * np.linalg.norm(rest)
 
 
-@pytest.mark.parametrize(
-    ("name", "moving"),
-    full_but(product(["cat", "satellite", "example:human"], [True, False]), ("cat", False), ("satellite", True)),
-)
-def test_sensitivity_of_motions_by_pinocchio(name: str, moving: bool):
-    """One change of both, at random: four runs of another integrator on another code's momentum."""
-    motion = motion_of(name, moving=moving)
-    change, turned = random_vector(5, momentum_scale(name)), random_vector(6, 1.0)
-    step = 4e-3 / np.linalg.norm(motion.sensitivity.by_attitude)
-    momenta, starts = neighbours(motion.momentum, motion.initial_attitude, change[None], turned[None], step)
-    body, loop = body_of(name), random_loop(1, body_of(name).n_shape)
-    ends = [
-        [pinocchio_motion(name, body.joint_names, loop, mu, start, [2.0]).attitude[0] for mu, start in zip(*row)]
-        for row in zip(momenta, starts)
-    ]
-    truth = extrapolated(np.array(ends), step)[0]
-    found = motion.sensitivity.by_momentum @ change + motion.sensitivity.by_attitude @ turned
-    assert np.linalg.norm(found - truth) < DIFFERENCES * np.linalg.norm(truth)
-
-
 # ---- Sensitivity: closed form and chain rule ------------------------------------------------------------------------
 
 
@@ -274,15 +251,6 @@ def test_sensitivity_of_two_motions_one_after_the_other(name: str, share: float)
     check_composition(name, first.path, second.path, random_vector(2, share * BODIES[name]))
 
 
-@pytest.mark.parametrize("kind", ["spline", "open spline", "waypoints"])
-@pytest.mark.parametrize("after", [sp.ShapePath.spline, sp.ShapePath.waypoints])
-def test_sensitivity_of_two_motions_with_breaks(kind: str, after: Callable[[Array, Array], sp.ShapePath]):
-    first = path_of(kind, body_of("cat").n_shape, 1)
-    shapes = np.random.default_rng(2).uniform(-0.5, 0.5, (5, first.n_shape))
-    shapes[0] = first.shape(first.duration)
-    check_composition("cat", first, after(np.linspace(0.0, 1.5, 5), shapes), random_vector(2, BODIES["cat"]))
-
-
 @pytest.mark.parametrize(("name", "loops"), full_but([("cat", (12, 6)), ("satellite", (20, 10))], ("cat", (12, 6))))
 def test_sensitivity_of_a_long_path_and_its_parts(name: str, loops: tuple[int, int]):
     """The few steps of the parts, and the many of the whole, where errors are known to grow in another way."""
@@ -324,18 +292,6 @@ def test_amplification_of_a_batch_covers_the_growth_to_the_end(tolerance: float)
     assert batch.amplification.shape == (30,)
     assert np.all(batch.amplification >= 1.0)
     assert np.all(batch.amplification >= 0.95 * largest_growth(batch))
-
-
-@pytest.mark.parametrize(("name", "tolerance"), full_but(product(BODIES, [1e-5, 1e-6]), ("cat_two_halves", 1e-5)))
-def test_amplification_of_fast_spins_covers_the_growth_to_the_end(name: str, tolerance: float):
-    """Hundreds of radians, at loose tolerances most of one in a step: what a step's growth lacks adds up."""
-    loop = random_loop(1, body_of(name).n_shape, size=0.2).path
-    deformation = sp.articulated(body_of(name), loop.repeated(4))
-    moment = float(np.trace(deformation.inertia(0.0))) / 3.0
-    for seed in range(4):
-        momentum = random_vector(seed, 15.0 * moment)
-        motion = sp.reconstruct(deformation, momentum, tolerance=tolerance)
-        assert motion.amplification >= 0.95 * largest_growth(motion)
 
 
 def test_amplification_remembers_growth_that_has_gone_again():
@@ -451,14 +407,6 @@ def test_phases_at_the_end_of_a_step_are_free_of_the_errors_between_steps():
     assert motion.solid_angle(0.0) == 0.0
 
 
-@pytest.mark.parametrize("case", EVERY_CASE)
-def test_phases_end_as_those_of_the_split(case: str):
-    motion = motion_of(case)
-    split, end = sp.split(motion, "base"), [motion.duration]
-    assert abs(motion.dynamic_phase(end)[0] - split.dynamic_phase) < PHASE
-    assert abs(modulo_sphere(motion.solid_angle(end)[0] - split.solid_angle)) < PHASE
-
-
 @pytest.mark.parametrize("size", full_but([0.1, 0.3], 0.3))
 @pytest.mark.parametrize("name", EVERY_BODY)
 def test_solid_angle_grows_continuously(name: str, size: float):
@@ -472,27 +420,6 @@ def test_solid_angle_grows_continuously(name: str, size: float):
     # Seen from the start, the closing great circle has no area.
     rate = np.cross(unit, np.cross(unit, omega)) @ start / (1.0 + unit @ start)
     assert np.abs(motion.solid_angle(edges) - running(weights, rate)).max() < PHASE
-
-
-@pytest.mark.parametrize("tilt", [0.4, 1.2, 2.0, 2.9])
-def test_phases_of_the_symmetric_top(tilt: float):
-    """Pi goes round a cone: its cap is counted again in every turn, that of the side where the start's opposite is not.
-
-    The rate about the momentum is twice the energy over |Pi|.
-    """
-    across, along, size, duration = 2.0, 1.0, 1.3, 40.0
-    body = size * np.array([np.sin(tilt), 0.0, np.cos(tilt)])
-    start = random_rotation(4)
-    motion = sp.reconstruct(sp.rigid(np.diag([across, across, along]), duration), start @ body, start, tolerance=TIGHT)
-    times = np.linspace(0.0, duration, 401)
-    rate = (np.sin(tilt) ** 2 / across + np.cos(tilt) ** 2 / along) * size
-    assert np.abs(motion.dynamic_phase(times) - rate * times).max() < PHASE
-    azimuth = -(1.0 / along - 1.0 / across) * body[2] * times
-    unit = np.stack([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), 0.0 * times + np.cos(tilt)], -1)
-    pole = np.sign(np.cos(tilt)) * UP
-    cap = (1.0 - abs(np.cos(tilt))) * azimuth * pole[2]
-    assert np.abs(azimuth[-1]) > 3.0
-    assert np.abs(motion.solid_angle(times) - cap - triangle(pole, unit, unit[:1])).max() < PHASE
 
 
 # ---- Batches, times, other methods ----------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from scipy.special import ellipj, ellipk
 
 import shapephase as sp
 from shapephase import so3, sphere
-from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError
+from shapephase.errors import ShapeError, SingularInertiaError
 from shapephase.rigid_body import EulerTop, separatrix_solid_angle
 from support.independent import rigid_motion
 from support.long_runs import full_but
@@ -482,56 +482,6 @@ def test_condition_of_steady_rotations():
     assert TOPS["h6_about_the_largest"].condition == 3.0
     assert TOPS["h6_about_the_middle"].condition == np.inf
     assert TOPS["h1_spherical"].condition == 1.0
-
-
-@pytest.mark.parametrize("name", TOPS)
-def test_a_rigid_motion_in_closed_form(name):
-    top = TOPS[name]
-    deformation = sp.rigid(top.inertia, 4.0)
-    exact = sp.reconstruct(deformation, top.momentum, top.initial_attitude, method="closed_form")
-    stepped = sp.reconstruct(deformation, top.momentum, top.initial_attitude, tolerance=1e-11, method="spectral")
-    times = np.linspace(0.0, 4.0, 9)
-    assert exact.method == "closed_form"
-    assert exact.error_estimate < 1e-12
-    assert so3.angle(so3.transpose(exact.attitude(times)) @ stepped.attitude(times)).max() < 1e-11
-    assert np.abs(exact.body_momentum(times) - top.body_momentum(times)).max() < 1e-13
-    assert exact.equation_residual < 1e-10
-    ours, theirs = sp.split(exact), sp.split(stepped)
-    assert abs(ours.montgomery_phase - theirs.montgomery_phase) < 1e-10
-    assert abs(ours.solid_angle - theirs.solid_angle) < 1e-10
-
-
-def test_a_batch_and_a_file_of_closed_form_motions(tmp_path):
-    rng = np.random.default_rng(4)
-    momenta, attitudes = rng.normal(size=(4, 3)), so3.exp(rng.normal(size=(4, 3)))
-    deformation = sp.rigid(np.diag(MOMENTS), 3.0)
-    batch = sp.reconstruct(deformation, momenta, attitudes, method="closed_form")
-    for one, momentum, attitude in zip(batch.final_attitude, momenta, attitudes, strict=True):
-        assert np.abs(one - EulerTop(np.diag(MOMENTS), momentum, attitude).attitude(3.0)).max() < 1e-14
-    batch.save(tmp_path / "m.npz")
-    assert np.abs(sp.load_motion(tmp_path / "m.npz").attitude(1.3) - batch.attitude(1.3)).max() < 1e-9
-    assert sp.reconstruct(deformation, np.zeros((0, 3)), method="closed_form").final_attitude.shape == (0, 3, 3)
-
-
-def test_long_motions_and_the_separatrix_say_what_rounding_leaves():
-    thousand = sp.reconstruct(sp.rigid(np.diag(MOMENTS), 1e4), [0.7, 0.2, 0.5], method="closed_form", tolerance=1e-10)
-    assert 1e-13 < thousand.error_estimate < 1e-10
-    turned = so3.exp(np.array([0.1, 0.2, 0.3]))
-    tensor = turned @ np.diag([1.0, 1.5, 3.0]) @ turned.T
-    with pytest.raises(AccuracyNotReached, match="separatrix"):
-        sp.reconstruct(sp.rigid(tensor, 10.0), turned @ [0.5, 0.0, 0.5], method="closed_form")
-    with pytest.raises(AccuracyNotReached, match="turns"):
-        sp.reconstruct(sp.rigid(np.diag(MOMENTS), 1e12), [0.7, 0.2, 0.5], method="closed_form", tolerance=1e-4)
-    long = sp.reconstruct(sp.rigid(np.diag(MOMENTS), 1e9), [0.7, 0.2, 0.5], method="closed_form", tolerance=1e-4)
-    assert so3.angle(long.final_attitude) <= np.pi
-    with pytest.raises(AccuracyNotReached, match="more"):
-        _ = long.equation_residual
-
-
-def test_only_rigid_deformations_have_the_closed_form():
-    still = sp.prescribed(lambda t: np.broadcast_to(np.eye(3), (len(t), 3, 3)), None, 1.0)
-    with pytest.raises(UnknownNameError, match="closed_form"):
-        sp.reconstruct(still, [0.0, 0.0, 1.0], method="closed_form")
 
 
 @pytest.mark.parametrize(

@@ -77,25 +77,6 @@ def test_curvature_in_rates_by_differences_and_brackets(both):
     assert np.abs(np.einsum("abc,ck->abk", structure, columns)).max() > 0.05 * np.abs(exact).max()
 
 
-def test_small_loops_turn_by_the_curvature(both):
-    """Round a figure of four arcs e^(s x) e^(s y) e^(-s x) e^(-s y) and the arc of the bracket that closes it: the
-    holonomy is exp(-s^2 F) up to the third order."""
-    body, _ = both
-    exact = sp.curvature(body, LOCK, of="rates")[0, 1]
-    errors = []
-    for size in (0.08, 0.04):
-        corners = [LOCK]
-        for unit, side in ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0)):
-            corners.append(moved(corners[-1], np.eye(7)[unit], side * size))
-        # From corner to corner on great circles, and back from the last, which is s^2 e_z away.
-        times = np.arange(len(corners) + 1.0)
-        loop = sp.ShapePath.waypoints(times, [*corners, LOCK], joint_names=body.joint_names)
-        turn = so3.log(sp.holonomy(body, loop, 1e-11))
-        errors.append(np.abs(turn + size**2 * exact).max())
-    assert errors[1] < 0.3 * np.abs(0.04**2 * exact).max()
-    assert 7.0 < errors[0] / errors[1] < 9.0
-
-
 def test_the_holonomy_answers_to_the_loop(both):
     """Its derivative, an integral of the curvature, against differences of holonomies of order four."""
     body, _ = both

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
@@ -151,28 +151,6 @@ def test_elroys_beanie(kind, load_urdf):
         np.testing.assert_allclose(sp.holonomy(body, path, 1e-12), want, atol=1e-11, rtol=0)
 
 
-def test_elroys_beanie_with_its_centres_off_the_pin(load_urdf):
-    """The planar connection by the reduced mass, integrated by quadrature."""
-    m1, m2, i1, i2, d1, d2 = 2.0, 1.0, 3.0, 0.7, 0.8, 0.5
-    body = load_urdf(
-        urdf(
-            link("head", m1, [2, 2, i1], (-d1, 0, 0)),
-            link("beanie", m2, [0.4, 0.4, i2], (d2, 0, 0)),
-            joint("pin", "continuous", "head", "beanie"),
-        )
-    )
-    reduced = m1 * m2 / (m1 + m2)
-
-    def connection(angle):
-        mixed = d1 * d2 * np.cos(angle)
-        return (i2 + reduced * (d2**2 + mixed)) / (i1 + i2 + reduced * (d1**2 + d2**2 + 2 * mixed))
-
-    turn, _ = quad(connection, 0.0, 2.0 * np.pi, epsabs=1e-13)
-    path = sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [2.0 * np.pi]])
-    np.testing.assert_allclose(sp.holonomy(body, path, 1e-12), about(Z, -turn), atol=1e-11, rtol=0)
-    np.testing.assert_allclose(sp.mechanical_connection(body, [0.9])[:, 0], connection(0.9) * Z, atol=1e-13, rtol=0)
-
-
 def test_a_reaction_wheel_in_a_lopsided_body(load_urdf):
     """Balanced and round, it leaves I alone: one turn gives exp(-2 pi I^-1 I_w a), about no axis of symmetry."""
     turn = about(Rotation.from_rotvec([0.3, -0.5, 0.9]).apply([1, 0, 0]), 0.8)
@@ -197,86 +175,6 @@ def test_a_reaction_wheel_in_a_lopsided_body(load_urdf):
 
 
 # ---- Cats and astronauts --------------------------------------------------------------------------------------------
-
-
-def kane_scher(bend, duration=1.0):
-    """The two halves go round with a constant bend and no twist: R = exp(bend n(h)), n = (0, cos h, -sin h)."""
-
-    def f(t):
-        h = 2.0 * np.pi * t / duration
-        y, z, s, c = np.cos(h), -np.sin(h), np.sin(bend), np.cos(bend)
-        dy, dz = z, -y  # by h
-        yaw_sine, dyaw_sine = z * s, dz * s
-        top, dtop = -(1 - c) * y * z, -(1 - c) * (dy * z + y * dz)
-        low, dlow = c + (1 - c) * y * y, 2 * (1 - c) * y * dy
-        shapes = np.stack([np.arctan2(y * s, c + 0 * t), np.arcsin(yaw_sine), np.arctan2(top, low)], -1)
-        rates = np.stack(
-            [
-                dy * s * c / (y * y * s * s + c * c),
-                dyaw_sine / np.sqrt(1 - yaw_sine**2),
-                (dtop * low - top * dlow) / (top**2 + low**2),
-            ],
-            -1,
-        )
-        return shapes, rates * 2.0 * np.pi / duration
-
-    return sp.ShapePath.function(f, duration, joint_names=["waist_pitch", "waist_yaw", "waist_roll"])
-
-
-@pytest.mark.parametrize("half_bend", [0.2, 0.5, 0.9])
-def test_kane_and_scher(half_bend):
-    """Turn 2 pi j cos(g/2)/(sin^2(g/2) + j cos^2(g/2)), j = 1/4, about the axis between the two halves.
-
-    Seen from the plane of the bend both halves spin by +2 pi about their axes; the plane turns the other way
-    (theory.md section 7).
-    """
-    j, s, c = 0.25, np.sin(half_bend), np.cos(half_bend)
-    turn = 2.0 * np.pi * j * c / (s**2 + j * c**2)
-    found = sp.holonomy(sp.load_body("cat_two_halves"), kane_scher(2 * half_bend), 1e-11)
-    np.testing.assert_allclose(found, about([c, 0.0, -s], -turn), atol=1e-10, rtol=0)
-
-
-def test_kane_and_schers_cat_lands_on_its_feet():
-    """The turn is 180 degrees at a bend g between the halves with cos(g/2) = (-j + sqrt(j^2 - j + 1))/(1 - j)."""
-    cat = sp.load_body("cat_two_halves")
-    bend = 2.0 * np.arccos((-0.25 + np.sqrt(0.25**2 - 0.25 + 1)) / 0.75)
-    assert np.degrees(bend) == pytest.approx(59.426458741516, abs=1e-11)
-    assert angle_of(sp.holonomy(cat, kane_scher(bend), 1e-11)) == pytest.approx(np.pi, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("moves", "duration", "turn"),
-    [
-        (
-            {
-                "left_shoulder_flexion": (-1.05, 2.05, 0.0),
-                "right_shoulder_flexion": (-1.05, 2.05, 0.0),
-                "left_shoulder_abduction": (0.75, 0.0, -0.75),
-                "right_shoulder_abduction": (-0.75, 0.0, 0.75),
-            },
-            2.0,
-            0.206386036527,
-        ),
-        (
-            {
-                "left_hip_flexion": (-0.75, 1.2, 0.0),
-                "right_hip_flexion": (-0.75, 1.2, 0.0),
-                "left_knee": (1.15, 0.0, -1.15),
-                "right_knee": (1.15, 0.0, -1.15),
-                "lumbar_flexion": (0.25, -0.5, 0.0),
-            },
-            4.0,
-            0.215596595975,
-        ),
-    ],
-    ids=["arm circles", "lower body"],
-)
-def test_an_astronaut_pitches_forward(moves, duration, turn):
-    """Values found by a program without Pinocchio (80-bit Magnus steps on its own kinematics), to 12 digits."""
-    astronaut = sp.load_body("astronaut")
-    mean, a, b = (astronaut.shape({name: row[k] for name, row in moves.items()}) for k in range(3))
-    path = sp.ShapePath.fourier(mean, a[:, None], b[:, None], duration)
-    np.testing.assert_allclose(sp.holonomy(astronaut, path, 1e-12), about([0, 1, 0], turn), atol=2e-12, rtol=0)
 
 
 # ---- Laws of the holonomy -------------------------------------------------------------------------------------------

@@ -167,60 +167,6 @@ def test_curvature_against_differences_of_order_eight(body, rng):
     np.testing.assert_array_equal(found, -np.swapaxes(found, 0, 1))
 
 
-@pytest.mark.parametrize(
-    ("name", "pairs"),
-    [
-        ("cat_two_halves", "all"),
-        ("cat", 2),
-        pytest.param("example:human", 2, marks=pytest.mark.full),
-        ("example:kinova", 2),
-        ("satellite", [("boom_extension", "wheel_spin"), ("left_wing_drive", "boom_extension")]),
-    ],
-)
-def test_squares_from_a_corner_turn_the_body_by_the_curvature(name, pairs, rng):
-    """B6: exp(-side^2 F_ij) up to the third power of the side, for angles, slides and joints without end."""
-    body = sp.load_body(name)
-    shape = random_shapes(body, rng, 1)[0]
-    if isinstance(pairs, list):
-        chosen = [tuple(map(body.joint_index, pair)) for pair in pairs if set(pair) <= set(body.joint_names)]
-    else:
-        every = list(itertools.combinations(range(body.n_shape), 2))
-        size = np.array([np.abs(sp.curvature(body, shape)[pair]).max() for pair in every])
-        every = [pair for pair, big in zip(every, size, strict=True) if big > 1e-3]
-        count = len(every) if pairs == "all" else pairs
-        chosen = [every[k] for k in rng.choice(len(every), count, replace=False)]
-    assert len(chosen) >= 2
-    sides = 0.02 * 0.5 ** np.arange(5)
-    for i, j in chosen:
-        u, v = np.eye(body.n_shape)[[i, j]]
-        field = sp.curvature(body, shape)[i, j]
-        left = []
-        for side in sides:
-            corners = shape + side * np.array([0 * u, u, u + v, v, 0 * u])
-            path = sp.ShapePath.waypoints(np.arange(5.0), corners)
-            left.append(np.linalg.norm(rotation_vector(sp.holonomy(body, path, 1e-13)) + side**2 * field))
-        slope = np.polyfit(np.log(sides), np.log(left), 1)[0]
-        assert slope > 2.97, (body.joint_names[i], body.joint_names[j], slope)
-        # The next power of the side tilts the slope between two sides in proportion to them; in the limit it is three.
-        steps = np.log2(np.array(left[:-1]) / left[1:])
-        # What is left after the last side is known to the tolerance of its holonomy.
-        unsure = 3.0 * 1e-13 / (np.log(2.0) * left[-1])
-        assert abs(2.0 * steps[-1] - steps[-2] - 3.0) < 1e-4 + unsure, (body.joint_names[i], body.joint_names[j], steps)
-        assert left[-1] < 0.05 * sides[-1] ** 2 * np.linalg.norm(field)
-
-
-def test_a_plane_asks_two_derivatives_a_shape(monkeypatch):
-    cat, asked = sp.load_body("cat"), []
-    true = sp.Body.sample_rates
-    monkeypatch.setattr(sp.Body, "sample_rates", lambda *args: asked.append(len(args[1])) or true(*args))
-    neutral = curvature_on_plane(cat, ("waist_yaw", "waist_pitch"), [0.1, 0.3], [0.0, 0.1, 0.2])
-    assert sum(asked) == 2 * 6
-    want = sp.curvature(cat, cat.shape({"waist_yaw": 0.3, "waist_pitch": 0.1}))
-    pair = cat.joint_index("waist_yaw"), cat.joint_index("waist_pitch")
-    np.testing.assert_allclose(neutral[1, 1], want[pair], atol=1e-14, rtol=0)
-    assert curvature_on_plane(cat, (0, 1), [], [0.1]).shape == (0, 1, 3)
-
-
 def test_a_plane_is_told_what_is_wrong_with_it():
     cat = sp.load_body("cat_two_halves")
     with pytest.raises(UnknownNameError, match="'waist_pitch'"):
@@ -461,69 +407,6 @@ def test_rays_through_shapes_on_one_line_are_refused(load_urdf):
 # ---- Mimic joints ---------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def led_and_free(load_urdf):
-    """A body whose third joint follows the first with a factor and an offset, and the same body without that rule."""
-
-    def spatial(extra):
-        return load_urdf(
-            urdf(
-                link("trunk", 3.0, [0.5, 0.7, 0.9], (0.1, 0.0, -0.1)),
-                link("upper", 1.0, [0.1, 0.2, 0.25], (0.3, 0.1, 0.0)),
-                link("lower", 0.8, [0.1, 0.15, 0.2], (0.2, 0.0, 0.2)),
-                link("other", 1.2, [0.2, 0.25, 0.3], (-0.4, 0.0, 0.1)),
-                joint("lead", "revolute", "trunk", "upper", (0.3, 1.0, 0.2), (0.5, 0.2, 0.1)),
-                joint("second", "revolute", "upper", "lower", (1.0, 0.0, 0.4), (0.6, 0.0, 0.0)),
-                joint("follow", "revolute", "trunk", "other", (0.0, 0.6, 1.0), (-0.5, -0.2, 0.3), extra=extra),
-            )
-        )
-
-    return spatial('<mimic joint="lead" multiplier="-1.7" offset="0.4"/>'), spatial("")
-
-
-def unfolded(led, free, shapes):
-    """Shapes of the free body: (..., 2) -> (..., 3), and the factors (3, 2)."""
-    factors = np.zeros((3, 2))
-    lead, second = map(led.joint_index, ("lead", "second"))
-    for name, row in (("lead", (lead, 1.0)), ("second", (second, 1.0)), ("follow", (lead, -1.7))):
-        factors[free.joint_index(name), row[0]] = row[1]
-    return shapes @ factors.T + free.shape({"follow": 0.4}), factors
-
-
-def test_curvature_of_a_body_with_a_follower(led_and_free, rng):
-    led, free = led_and_free
-    assert (led.n_shape, free.n_shape) == (2, 3)
-    for shape in rng.uniform(-1.5, 1.5, (4, 2)):
-        whole, factors = unfolded(led, free, shape)
-        want = np.einsum("ki,lj,kla->ija", factors, factors, sp.curvature(free, whole))
-        np.testing.assert_allclose(sp.curvature(led, shape), want, atol=1e-13, rtol=0)
-        plane = curvature_on_plane(led, (0, 1), shape[:1], shape[1:])
-        np.testing.assert_allclose(plane[0, 0], want[0, 1], atol=1e-13, rtol=0)
-        step = 0.02
-        around = shape + step * np.arange(-4, 5)[:, None, None] * np.eye(2)
-        slopes = np.einsum("k,kiaj->ija", EIGHTH, sp.mechanical_connection(led, around)) / step
-        columns = sp.mechanical_connection(led, shape).T
-        np.testing.assert_allclose(want[0, 1], slopes[0, 1] - slopes[1, 0] - np.cross(*columns), atol=1e-11, rtol=0)
-
-
-def test_stokes_and_lift_of_a_body_with_a_follower(led_and_free):
-    """Against the body without the rule, its third joint moved by hand."""
-    led, free = led_and_free
-    path = ellipse(led, ("lead", "second"), (60 * DEGREE, 50 * DEGREE), lead=0.1, second=-0.3)
-
-    def by_hand(t):
-        shapes, factors = unfolded(led, free, path.shape(t))
-        return shapes, path.rate(t) @ factors.T
-
-    same = sp.ShapePath.function(by_hand, path.duration)
-    want = plain_lift(free, same, np.linspace(0.0, path.duration, 5))
-    assert np.linalg.norm(rotation_vector(want[-1])) > 0.01
-    assert apart(stokes_holonomy(led, path, 1e-11), want[-1]) < 2e-11
-    assert apart(stokes_holonomy(free, same, 1e-11), want[-1]) < 2e-11
-    lift = horizontal_lift(led, path, 1e-11)
-    assert apart(lift.attitude(np.linspace(0.0, path.duration, 5)), want) < 2e-11
-
-
 # ---- Flatness -------------------------------------------------------------------------------------------------------
 
 
@@ -719,17 +602,6 @@ def test_the_lift_of_a_loop_ends_in_its_holonomy(body, rng):
     assert apart(lift.attitude(path.duration), lift.end) < 1e-14
     twice = horizontal_lift(body, path.repeated(2), 1e-11)
     assert apart(twice.attitude(1.3 * path.duration), lift.end @ lift.attitude(0.3 * path.duration)) < 3e-11
-
-
-def test_a_lift_of_a_lift(rng):
-    """From the middle on: U(b) = U(a) times the lift of the rest."""
-    cat = sp.load_body("cat_two_halves")
-    corners = random_shapes(cat, rng, 3)
-    first, second = (sp.ShapePath.waypoints([0, 1], corners[k : k + 2]) for k in (0, 1))
-    whole = horizontal_lift(cat, first.then(second), 1e-11).end
-    parts = horizontal_lift(cat, first, 1e-11).end @ horizontal_lift(cat, second, 1e-11).end
-    assert apart(whole, parts) < 3e-11
-    assert apart(parts, horizontal_lift(cat, second, 1e-11).end @ horizontal_lift(cat, first, 1e-11).end) > 1e-3
 
 
 def test_a_lift_checks_its_times_and_joints():

@@ -5,8 +5,6 @@ The truth is differences of `holonomy` at 1e-13, and what the geometry says of v
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -82,23 +80,6 @@ def test_another_pace_changes_nothing(name: str):
     np.testing.assert_allclose(derivative[0], turned @ rate - rate, atol=1e-11, rtol=0)
 
 
-def test_a_small_square_turns_by_the_curvature():
-    """Of side e, the derivative by the side is the curvature along the two far sides: two ways to one number."""
-    body = body_of("cat_two_halves")
-    shape = np.full(body.n_shape, 0.3)
-    first, second = np.eye(body.n_shape)[:2]
-    side = 1e-6
-    corners = [shape, shape + side * first, shape + side * (first + second), shape + side * second, shape]
-    path = sp.ShapePath.waypoints([0.0, 1.0, 2.0, 3.0, 4.0], corners)
-
-    def growing(t: np.ndarray) -> np.ndarray:
-        return ((path.shape(t) - shape) / side)[:, None]
-
-    _, derivative = sp.holonomy_derivative(body, path, growing, 1e-12)
-    expected = -2.0 * side * sp.curvature(body, shape + 0.5 * side * (first + second))[0, 1]
-    np.testing.assert_allclose(derivative[0], expected, rtol=1e-5)
-
-
 def test_pieces_and_their_breaks_are_followed():
     """A closed path of waypoints, varied by moving one of them: piecewise smooth, with corners of the variation."""
     body = body_of("cat_two_halves")
@@ -160,42 +141,3 @@ def test_rows_that_open_the_loop_or_have_another_shape_are_refused():
 
     with pytest.raises(sp.errors.AccuracyNotReached, match="breaks"):
         sp.holonomy_derivative(body, path, jumping, 1e-9)
-
-
-def test_the_holonomy_of_a_there_and_back_answers_to_one_way_alone():
-    """There and back turns nothing; varied on the way there only, by the curvature between the two ways."""
-    family = Family("cat_two_halves", seed=6, directions=1)
-    body = family.body
-    there = sp.ShapePath.waypoints([0.0, 1.0], [np.zeros(body.n_shape), np.full(body.n_shape, 0.5)])
-    both = there.then(there.reversed())
-    bump = np.linspace(0.5, 1.0, body.n_shape)
-
-    def variation(t: np.ndarray) -> np.ndarray:
-        on_the_way = np.where(t < 1.0, (t * (1.0 - t)) ** 2, 0.0)
-        return on_the_way[:, None, None] * bump
-
-    turned, derivative = sp.holonomy_derivative(body, both, variation, 1e-12)
-    np.testing.assert_allclose(turned, np.eye(3), atol=1e-12, rtol=0)
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    times = 0.5 * (nodes + 1.0)
-    total = np.zeros(3)
-    attitude = sp.reconstruct(sp.articulated(body, there), np.zeros(3), tolerance=1e-12).attitude(times)
-    fields = zip(times, 0.5 * weights, attitude, there.shape(times), there.rate(times), strict=True)
-    for time, weight, rotation, shape, rate in fields:
-        bend = np.einsum("ija,i,j->a", sp.curvature(body, shape), rate, (time * (1.0 - time)) ** 2 * bump)
-        total += weight * rotation @ bend
-    np.testing.assert_allclose(derivative[0], total, atol=1e-12, rtol=0)
-
-
-def test_neighbouring_pieces_add_up():
-    """The derivative is linear in the variation."""
-    family = Family("astronaut", seed=7)
-    path, weights = family.path(), np.array([0.3, -1.1, 2.0])
-
-    def mixed(t: np.ndarray) -> np.ndarray:
-        return np.einsum("m,tmn->tn", weights, family.variation(t))[:, None]
-
-    _, parts = sp.holonomy_derivative(family.body, path, family.variation, 1e-12)
-    _, whole = sp.holonomy_derivative(family.body, path, mixed, 1e-12)
-    np.testing.assert_allclose(whole[0], weights @ parts, atol=1e-12 * np.abs(parts).max(), rtol=0)
-    assert all(np.abs(a - b).max() > 1e-3 for a, b in pairwise(parts))

@@ -219,16 +219,6 @@ def test_waypoints_are_quintics_from_rest_to_rest(rng):
 # ---- Functions ------------------------------------------------------------------------------------------------------
 
 
-def test_a_function_path_is_its_function(rng):
-    path = ShapePath.function(
-        lambda t: (np.stack([np.sin(t), t**2], -1), np.stack([np.cos(t), 2 * t], -1)), 3.0, joint_names=["a", "b"]
-    )
-    t = rng.uniform(0, 3, 9)
-    np.testing.assert_array_equal(path.shape(t), np.stack([np.sin(t), t**2], -1))
-    np.testing.assert_array_equal(path.rate(t), np.stack([np.cos(t), 2 * t], -1))
-    assert path.joint_names == ("a", "b")
-
-
 @pytest.mark.parametrize(
     "rates",
     [
@@ -489,19 +479,6 @@ def assert_corners(path, rates):
     before, after = beside(path)
     np.testing.assert_allclose(before, rates[:-1], atol=1e-8, rtol=0)
     np.testing.assert_allclose(after, rates[1:], atol=1e-8, rtol=0)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_corners_keep_their_sides(seed):
-    rng = np.random.default_rng(seed)
-    path, rates = zigzag([0.0, *np.cumsum(rng.uniform(0.05, 1.0, 5))], rng)
-    factor = rng.uniform(0.2, 7.0)
-    assert_corners(path, rates)
-    assert_corners(path.repeated(4), np.tile(rates, (4, 1)))
-    assert_corners(path.then(path), np.tile(rates, (2, 1)))
-    assert_corners(path.reversed(), -rates[::-1])
-    assert_corners(path.reversed().repeated(3), -np.tile(rates[::-1], (3, 1)))
-    assert_corners(path.stretched(factor), rates / factor)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -11,9 +11,9 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ..inertia_tensor import FULL_FROM_SIX, SIX_OF_FULL
+from ..inertia_tensor import SIX_OF_FULL
 from .joint_chain import JointChain
-from .link_motions import LinkMotions, components, cross, link_motions
+from .link_motions import LinkMotions, components, cross
 
 _STOPS = (3, 6, 9)  # rows of `_link_sums` at which mass times velocity, angular momentum and inertia begin
 
@@ -55,33 +55,6 @@ def by_shape_and_rate(
         np.matmul(rows[:, which], np.moveaxis(columns, 0, 1), out=by_shape[:, which])
     by_rates = rows.reshape(count, -1, 3) @ np.moveaxis(by_rate, 0, 1)
     return _by_independent(chain, by_shape.reshape(count, several * count_of_rows, -1), by_rates, shapes, rates)
-
-
-def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Array, Array]:
-    """The gradients by shape and by rates of the kinetic energy that a joint motion without angular momentum has.
-
-    The base turns so that the energy is least: how that changes does not matter. In the names of `by_shape_and_rate` a
-    unit of turn adds y . (h - o x q) - q . (z x v_o), of its rate z . (h - o x q); a unit of slide q . y, of its rate
-    q . s.
-
-    shapes, rates : (N, n)
-
-    Returns (N, n) each [J per unit of joint], [J s per unit of joint]
-    """
-    links = link_motions(chain, shapes, rates)
-    link_sums = _link_sums(chain, links)
-    sums, at = _carried(chain, link_sums), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
-    _, _, momentum, inertia = np.split(link_sums.sum(axis=-1), _STOPS)
-    tensors = np.moveaxis(inertia[FULL_FROM_SIX], -1, 0)
-    spin = -np.linalg.solve(tensors, momentum.T[..., None])[..., 0].T[:, :, None]
-    drift = sums.drift + cross(spin, sums.moment)
-    whole = spin + at.spins
-    about = sums.momentum + _turned(sums.inertia, spin) - cross(at.origins, drift)
-    speeds = at.speeds + cross(spin, at.origins)
-    by_shape = cross(whole, at.axes) * about - cross(at.axes, speeds) * drift + cross(whole, at.slides) * drift
-    by_rate = at.axes * about + at.slides * drift
-    gradients = _by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
-    return gradients[0][:, 0], gradients[1][:, 0]
 
 
 def _by_independent(

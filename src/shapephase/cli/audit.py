@@ -8,15 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import ShapeError
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    TRAJECTORY_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    PrintOptions,
-    TrajectoryOptions,
-)
+from . import options
 from .outcome import FIGURE_ENDINGS, ExitCode, Outcome, check_writable
 from .progress import steps
 from .terminal import write_file
@@ -32,17 +24,17 @@ Trajectories = Annotated[
 
 
 def audit_command(
-    body: BodyArgument,
+    body: options.BodyArgument,
     /,
     *trajectories: Trajectories,
-    floating: BodyOptions = BODY_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
     tolerance: Annotated[float | None, Parameter(show_default=False)] = None,
     flight: Annotated[tuple[str, ...], Parameter(negative_iterable="", consume_multiple=True)] = ("auto",),
-    reading: TrajectoryOptions = TRAJECTORY_DEFAULTS,
+    reading: options.TrajectoryOptions = options.TRAJECTORY_DEFAULTS,
     every: Annotated[int | None, Parameter(show_default=False)] = None,
     figure: Path | None = None,
     html: Annotated[Path | None, Parameter(show_default=False)] = None,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Audit trajectories in flight: momentum, fall, attitude and rates, and what explains it if they are wrong.
 
@@ -83,12 +75,12 @@ def audit_command(
         raise ShapeError(f"--integrator-step: {needed}, got {len(given)}")
     loaded = body_argument(body, floating)
     each = given if len(given) == len(trajectories) else given * len(trajectories)
-    options: dict[str, Any] = vars(reading) | {"timestep": reading.step, "names": column_names(reading.names) or None}
-    del options["step"], options["integrator_step"]
+    choices: dict[str, Any] = vars(reading) | {"timestep": reading.step, "names": column_names(reading.names) or None}
+    del choices["step"], choices["integrator_step"]
     with steps(2) as work:
         work.begin("reading")
         runs = [
-            read_trajectory(file, loaded, integrator_step=step, **options)
+            read_trajectory(file, loaded, integrator_step=step, **choices)
             for file, step in zip(trajectories, each, strict=True)
         ]
         work.begin("auditing")

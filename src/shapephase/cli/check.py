@@ -8,26 +8,14 @@ from pathlib import Path
 from typing import Annotated
 
 from ..errors import ImplausibleBodyWarning, ShapeError, TrajectoryWarning
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    WHEEL_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    MotionArgument,
-    PrintOptions,
-    RecordingOptions,
-    WheelOptions,
-    option,
-    rare,
-)
+from . import options
+from .options import option, rare
 from .outcome import ExitCode, Outcome
 
 
 def check_command(
-    body: BodyArgument,
-    motion: MotionArgument | None = None,
+    body: options.BodyArgument,
+    motion: options.MotionArgument | None = None,
     /,
     *,
     clearance: Annotated[
@@ -42,10 +30,10 @@ def check_command(
         Path | None,
         rare("Pairs of links that --clearance leaves out: an SRDF file; for example `--srdf robot.srdf`."),
     ] = None,
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Check a body, and a joint motion for it: what was read, what looks unlikely, and whether it can be used."""
     from ..body.collisions.geometry import collision_geometry

@@ -5,32 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    START_DEFAULTS,
-    WHEEL_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    MotionArgument,
-    PageFile,
-    PrintOptions,
-    RecordingOptions,
-    StartOptions,
-    Tolerance,
-    WheelOptions,
-    option,
-    rare,
-)
+from . import options
+from .options import option, rare
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import write_file
 
 
 def contributions_command(
-    body: BodyArgument,
-    motion: MotionArgument,
+    body: options.BodyArgument,
+    motion: options.MotionArgument,
     /,
     *,
     of: Annotated[
@@ -93,13 +77,13 @@ def contributions_command(
         Path | None,
         option("Write bars and areas to this file, .svg, .pdf or .png; for example `--figure shares.pdf`."),
     ] = None,
-    html: PageFile = None,
-    start: StartOptions = START_DEFAULTS,
-    tolerance: Tolerance = 1e-9,
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    html: options.PageFile = None,
+    start: options.StartOptions = options.START_DEFAULTS,
+    tolerance: options.Tolerance = 1e-9,
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find who made a turn: the share of momentum and limbs in a twist, tilt or somersault.
 

@@ -9,21 +9,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..errors import ShapeError
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    START_DEFAULTS,
-    WHEEL_DEFAULTS,
-    BodyOptions,
-    PrintOptions,
-    RecordingOptions,
-    StartOptions,
-    Tolerance,
-    WheelOptions,
-    option,
-    rare,
-)
+from . import options
+from .options import option, rare
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import say_written
@@ -60,11 +47,11 @@ class FileOptions:
 
 _FILE_DEFAULTS = FileOptions()
 _STORED = (
-    START_DEFAULTS,
+    options.START_DEFAULTS,
     _TOLERANCE,
-    WHEEL_DEFAULTS,
-    RECORDING_DEFAULTS,
-    BODY_DEFAULTS,
+    options.WHEEL_DEFAULTS,
+    options.RECORDING_DEFAULTS,
+    options.BODY_DEFAULTS,
 )  # options for motions computed here
 _WHOLE = 1.0 + 1e-12  # the last sample is at the end where the duration is a whole number of samples
 _ENDINGS = {"ck": (".bc",), "aem": (".aem", ".txt", ".xml"), "mot": (".mot", ".sto")}
@@ -107,12 +94,12 @@ def export_command(
             negative="",
         ),
     ] = False,
-    start: StartOptions = START_DEFAULTS,
-    tolerance: Tolerance = _TOLERANCE,
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    start: options.StartOptions = options.START_DEFAULTS,
+    tolerance: options.Tolerance = _TOLERANCE,
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Write a motion for other programs: SPICE, CCSDS, ROS, tables, OpenSim, animation.
 

@@ -4,18 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    MotionArgument,
-    OptionalFigureFile,
-    PrintOptions,
-    RecordingOptions,
-    option,
-)
+from . import options
+from .options import option
 from .outcome import FIGURE_ENDINGS, Outcome, check_writable
 from .progress import steps
 from .terminal import write_file
@@ -26,8 +16,8 @@ if TYPE_CHECKING:
 
 
 def loop_command(
-    body: BodyArgument,
-    motion: MotionArgument,
+    body: options.BodyArgument,
+    motion: options.MotionArgument,
     /,
     *,
     joints: Annotated[
@@ -45,10 +35,10 @@ def loop_command(
             "example `--component x`."
         ),
     ] = None,
-    out: OptionalFigureFile = None,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    out: options.OptionalFigureFile = None,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """See a loop of joints on the curvature, and how the flux through it becomes the turn of the body.
 

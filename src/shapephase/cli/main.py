@@ -42,14 +42,6 @@ from .sweep import plot_study_command, sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, verbosity, verbosity_from
 from .torques import torques_command
 
-# Options that had a second name.
-_RENAMED = {
-    "--rotate": '--turn "DEGREES about AXIS"',
-    "--about": '--turn "DEGREES about AXIS"',
-    "--hold": "--joints -JOINT",
-    "--trim": "--flight FIRST LAST",
-    "--timestep": "--step",
-}
 _EXIT_CODES = "\n".join(["Exit codes:", "", *(f"- {code.value}: {code.meaning}" for code in ExitCode)])
 _WHERE_EXIT_CODES = "Exit codes: `shapephase --help`"
 app = App(
@@ -189,17 +181,14 @@ def _usage_message(error: CycloptsError) -> str:
     chain, apps, _ = app.parse_commands(error.command_chain or ())
     usage = format_usage(app, chain, execution_path=apps).plain.strip()
     words = [one_line(error)]
-    option = error.argument.name if error.argument is not None else ""
-    if isinstance(error, UnknownOptionError):
-        option = error.token.keyword or error.token.value
-        words = [f"Unknown option: {option}. Use {_RENAMED[option]}."] if option in _RENAMED else words
-    elif error.argument is not None:
+    if error.argument is not None:
+        option = error.argument.name
         described = {
             own.name: own.parameter.help for own in apps[-1].assemble_argument_collection(parse_docstring=True)
         }
         example = re.search(rf"example\s+`({re.escape(option)}\s[^`]*)`", str(described.get(option)))
         words += [f"For example `{' '.join(example[1].split())}`."] if example else []
-    elif not chain:
+    elif not chain and not isinstance(error, UnknownOptionError):
         words.append("The command comes first, as in `shapephase split cat cat_righting`.")
     return f"{' '.join(words)} Usage: {usage}; see {' '.join(('shapephase', *chain))} --help"
 

@@ -5,32 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    START_DEFAULTS,
-    WHEEL_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    MotionArgument,
-    PageFile,
-    PrintOptions,
-    RecordingOptions,
-    StartOptions,
-    Tolerance,
-    WheelOptions,
-    option,
-    rare,
-)
+from . import options
+from .options import option, rare
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import write_file
 
 
 def momentum_command(
-    body: BodyArgument,
-    motion: MotionArgument,
+    body: options.BodyArgument,
+    motion: options.MotionArgument,
     /,
     *,
     axes: Annotated[
@@ -91,13 +75,13 @@ def momentum_command(
             "example `--attitude-noise 0.2deg`."
         ),
     ] = None,
-    html: PageFile = None,
-    start: StartOptions = START_DEFAULTS,
-    tolerance: Tolerance = 1e-9,
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    html: options.PageFile = None,
+    start: options.StartOptions = options.START_DEFAULTS,
+    tolerance: options.Tolerance = 1e-9,
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find the angular momentum about the centre of mass in time, whole and by link, and its change in each flight.
 
@@ -130,13 +114,13 @@ def momentum_command(
         as_recorded = as_recorded and not spinning.names
         made_from: dict[str, object] = {}
         moving = None
-        options = {"axes": chosen, "normalise": normalise, "stature": stature, "speed": speed}
-        options |= {"gravity": recording.gravity or GRAVITY, "up": recording.up}
-        options |= {"joint_noise": None if levels is None else [levels[unit] for unit in loaded.joint_units]}
-        options |= {"attitude_noise": turn}
+        choices = {"axes": chosen, "normalise": normalise, "stature": stature, "speed": speed}
+        choices |= {"gravity": recording.gravity or GRAVITY, "up": recording.up}
+        choices |= {"joint_noise": None if levels is None else [levels[unit] for unit in loaded.joint_units]}
+        choices |= {"attitude_noise": turn}
         if as_recorded:
             work.begin("momenta and their bars")
-            found = segment_momentum(recorded, loaded, **options)
+            found = segment_momentum(recorded, loaded, **choices)
             seconds = float(found.times[-1] - found.times[0])
             heading = (
                 f"{loaded.name} along {motion}, as recorded: {seconds:g} s, {path.n_shape} joints, {loaded.mass:.6g} kg"
@@ -147,7 +131,7 @@ def momentum_command(
             )
             work.begin("momenta and their bars")
             moving = flown.motion
-            found = segment_momentum(moving, **options)
+            found = segment_momentum(moving, **choices)
             made_from = dict(moving.deformation.made_from)
             heading = f"{split_heading(flown.body, motion, moving)}{flown.beginning}"
         write_file(out, found.write_csv)

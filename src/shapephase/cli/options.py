@@ -214,7 +214,7 @@ class ColumnOptions:
     """How columns of recorded samples become joints and a base: options of `RecordingOptions` and of `audit`."""
 
     names: Annotated[tuple[str, ...], option(several=True)] = ()
-    """Which column is which joint: COLUMN=JOINT, COLUMN= to ignore a column, or a file of such lines (or of JSON); for
+    """Which column is which joint: COLUMN=JOINT, COLUMN= to ignore a column, or a file of such lines; for
     example `--names LKnee=left_knee frame=` or `--names lab.txt`."""
     degrees: Annotated[bool | None, option(negative="--radians")] = None
     """Turning joints are in degrees, or in radians; default: as the file states. For example `--degrees`."""
@@ -282,8 +282,8 @@ class RecordingOptions(ColumnOptions):
     """Close a cycle whose ends differ by at most this, in rad or m or with units; for example `--close 3deg` or
     `--close 3deg,5mm`."""
     close_by: Annotated[str | None, rare()] = None
-    """How it is closed: drift (the gap is subtracted evenly in time), smooth (a periodic smoother, with --smooth) or
-    geodesic (the shortest way back is appended); for example `--close-by geodesic`."""
+    """How it is closed: drift (the gap is subtracted evenly in time) or smooth (a periodic smoother, with --smooth);
+    for example `--close-by drift`."""
     gravity: Annotated[float | None, rare()] = None
     """Acceleration of the fall in flight, in m/s^2; default: 9.81. Another fall is an error: a unit of length or the
     frame rate is wrong. For example `--gravity 3.7`."""

@@ -4,19 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    WHEEL_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    MotionArgument,
-    PrintOptions,
-    RecordingOptions,
-    WheelOptions,
-    option,
-)
+from . import options
+from .options import option
 from .outcome import Outcome
 from .progress import steps
 
@@ -24,8 +13,8 @@ _MOMENTA = 1000  # about as many are integrated to search all directions
 
 
 def orbits_command(
-    body: BodyArgument,
-    motion: MotionArgument,
+    body: options.BodyArgument,
+    motion: options.MotionArgument,
     magnitude: float,
     /,
     *,
@@ -43,10 +32,10 @@ def orbits_command(
             "that can be met. For example `--tolerance 1e-7`."
         ),
     ] = None,
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find the closed orbits: motions whose shape and momentum close together; and split each.
 

@@ -9,26 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import ShapeError
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    START_DEFAULTS,
-    WHEEL_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    FigureFile,
-    FilmFile,
-    Gauge,
-    MotionArgument,
-    PageFile,
-    PrintOptions,
-    RecordingOptions,
-    StartOptions,
-    UpAxis,
-    WheelOptions,
-    option,
-)
+from . import options
+from .options import option
 from .outcome import FIGURE_ENDINGS, Outcome, check_writable
 from .progress import steps
 from .terminal import write_file
@@ -39,13 +21,13 @@ if TYPE_CHECKING:
 
 
 def view_command(
-    body: BodyArgument,
-    motion: MotionArgument,
+    body: options.BodyArgument,
+    motion: options.MotionArgument,
     /,
     *,
-    start: StartOptions = START_DEFAULTS,
-    html: PageFile = None,
-    video: FilmFile = None,
+    start: options.StartOptions = options.START_DEFAULTS,
+    html: options.PageFile = None,
+    video: options.FilmFile = None,
     trail: Annotated[str | None, option("Link that leaves a trail; for example `--trail head`.")] = None,
     speed: Annotated[
         float | None,
@@ -54,10 +36,10 @@ def view_command(
             "`--speed 0.1` for slow motion."
         ),
     ] = None,
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Show a motion in 3-D in a browser, or write it as one HTML file that opens offline, or as a film."""
     from ..plots.pages.motion_data import up_axis
@@ -87,7 +69,7 @@ def view_command(
 
 
 def explore_command(
-    body: BodyArgument,
+    body: options.BodyArgument,
     /,
     *,
     joints: Annotated[
@@ -97,10 +79,10 @@ def explore_command(
             help="Two joints; the others rest at zero. For example `--joints waist_pitch waist_yaw`.",
         ),
     ],
-    html: PageFile = None,
-    up: UpAxis = None,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    html: options.PageFile = None,
+    up: options.UpAxis = None,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Draw loops of two joints on a map of the curvature, and see what they turn the body by, in a browser or a file.
 
@@ -140,17 +122,17 @@ def deliver(page: Page, html: Path | None, video: Path | None) -> tuple[list[str
 
 def plot_command(
     kind: str,
-    body: BodyArgument,
-    motion: MotionArgument,
+    body: options.BodyArgument,
+    motion: options.MotionArgument,
     /,
     *,
-    out: FigureFile,
-    start: StartOptions = START_DEFAULTS,
-    gauge: Gauge = "horizontal",
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    out: options.FigureFile,
+    start: options.StartOptions = options.START_DEFAULTS,
+    gauge: options.Gauge = "horizontal",
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Draw one figure of a motion, one column wide.
 

@@ -5,27 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from .options import (
-    BODY_DEFAULTS,
-    ERROR_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    START_DEFAULTS,
-    WHEEL_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    ErrorOptions,
-    Gauge,
-    MotionArgument,
-    PrintOptions,
-    RecordingOptions,
-    ReportFile,
-    StartOptions,
-    Tolerance,
-    WheelOptions,
-    option,
-    rare,
-)
+from . import options
+from .options import option, rare
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import write_file
@@ -34,17 +15,17 @@ _ROWS = 201  # of the table of phases, as many as of samples
 
 
 def split_command(
-    body: BodyArgument,
-    motion: MotionArgument,
+    body: options.BodyArgument,
+    motion: options.MotionArgument,
     /,
     *,
-    start: StartOptions = START_DEFAULTS,
-    gauge: Gauge = "horizontal",
-    tolerance: Tolerance = 1e-9,
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
-    errors: ErrorOptions = ERROR_DEFAULTS,
-    html: ReportFile = None,
+    start: options.StartOptions = options.START_DEFAULTS,
+    gauge: options.Gauge = "horizontal",
+    tolerance: options.Tolerance = 1e-9,
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
+    errors: options.ErrorOptions = options.ERROR_DEFAULTS,
+    html: options.ReportFile = None,
     out: Annotated[
         Path | None, option("Write the motion to this NPZ file, or to a pipe; for example `--out fall.npz`.")
     ] = None,
@@ -70,8 +51,8 @@ def split_command(
             "example `--phases phases.csv`.",
         ),
     ] = None,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Split the rotation of a free body into shape holonomy and Montgomery phase."""
     import numpy as np

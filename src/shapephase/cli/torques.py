@@ -5,36 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from .options import (
-    BODY_DEFAULTS,
-    PRINT_DEFAULTS,
-    RECORDING_DEFAULTS,
-    START_DEFAULTS,
-    WHEEL_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    MotionArgument,
-    PrintOptions,
-    RecordingOptions,
-    StartOptions,
-    Tolerance,
-    WheelOptions,
-    option,
-)
+from . import options
+from .options import option
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import write_file
 
 
 def torques_command(
-    body: BodyArgument,
-    motion: MotionArgument,
+    body: options.BodyArgument,
+    motion: options.MotionArgument,
     /,
     *,
-    start: StartOptions = START_DEFAULTS,
-    tolerance: Tolerance = 1e-9,
-    wheels: WheelOptions = WHEEL_DEFAULTS,
-    recording: RecordingOptions = RECORDING_DEFAULTS,
+    start: options.StartOptions = options.START_DEFAULTS,
+    tolerance: options.Tolerance = 1e-9,
+    wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
+    recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
     out: Annotated[
         Path | None,
         option(
@@ -42,8 +28,8 @@ def torques_command(
             "file; for example `--out torques.csv`."
         ),
     ] = None,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find the torques of the joints: their peaks against the limits of the body's file, power and work.
 

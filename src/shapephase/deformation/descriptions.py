@@ -168,7 +168,7 @@ class ArticulatedDescription(UngaugedDescription):
     path: ShapePath
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        return self.body.sample(*self.path.at_samples(times))
+        return self.body.sample(*self.path.curve(times))
 
     def channels(self, times: Array) -> Array | None:
         return channels_along(self.body, self.path, times)

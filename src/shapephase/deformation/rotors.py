@@ -101,7 +101,7 @@ class RotorDescription(UngaugedDescription):
         wide = self.route.curve
         curve = wide.curve if isinstance(wide, Widened) else Reordered(wide, columns)
         names = tuple(joints[column] for column in columns)
-        return replace(self.route, curve=curve, n_shape=len(names), joint_names=names, scanner=None)
+        return replace(self.route, curve=curve, n_shape=len(names), joint_names=names)
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         shapes, rates = self.route.curve(times)
@@ -334,4 +334,4 @@ def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> Shap
     ordered = path.matched(others, f"{body.name} without {', '.join(left_out)}")
     columns = np.array([body.joint_index(name) for name in others], dtype=int)
     curve = Widened(ordered.curve, columns, body.n_shape)
-    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names, scanner=None)
+    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names)

@@ -88,13 +88,7 @@ def _causes(motion: ForcedMotion, along: ForcedAlong, inputs: Inputs) -> Iterato
 
     if inputs.samples is not None:
         samples = path_samples(described.path)
-        if samples.is_closing(along.times).any():
-            raise WrongObjectError(
-                "joints: a geodesic closes this path, whose duration depends on the samples, and with it the torque; "
-                "give the motion without the closing"
-            )
-        momenta = so3.apply(so3.transpose(along.attitudes), along.momenta)
-        by_knots = body.by_knots(samples, spins, rows, momenta[:, None])
+        by_knots = body.by_knots(samples, spins, rows)
         for rule in samples.rules:
             yield unmoved(rule(by_knots), inputs.samples)
         # The bias is one unknown of variance one, times its estimate.

@@ -138,10 +138,7 @@ class Derivatives:
     @cached_property
     def by_knots(self) -> ResultDerivative:
         """Derivatives by the values of the path at its knots, for a periodic path without the last."""
-        spins, _ = self._weights
-        momenta = np.zeros_like(spins)
-        momenta[:, 0] = self.motion.momentum @ self._along.attitudes
-        return self._results(_changes(self._body.by_knots(self._samples, *self._weights, momenta)))
+        return self._results(_changes(self._body.by_knots(self._samples, *self._weights)))
 
     def at_knots(self, rule: Callable[[Array], Array]) -> ResultDerivative:
         """Derivatives by the inputs of the values at the knots, by a rule (k, knots n) -> (k, m)."""
@@ -314,12 +311,11 @@ def described_by(motion: Motion | ForcedMotion) -> Described:
 def fit_by_knots(motion: Motion, times: Array, by_attitudes: Array, by_rates: Array) -> Array:
     """Derivative of the fit by the path at its knots: (6, knots n); the last arguments are of `RecordedMomentum`."""
     body_along, along, rows = _by_added_momentum(motion, times, by_attitudes)
-    momenta, samples = motion.momentum @ along.attitudes, path_samples(described_by(motion).path)
-    by_knots = body_along.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None])
+    samples = path_samples(described_by(motion).path)
+    by_knots = body_along.by_knots(samples, along.spins[:, None], rows[:, None])
     if by_rates.any():
         body_then, spins, rows = _by_momentum_at_rates(motion, times, by_rates)
-        momenta = motion.momentum @ motion.attitude(times)
-        by_knots = by_knots + body_then.by_knots(samples, spins[:, None], rows[:, None], momenta[:, None])
+        by_knots = by_knots + body_then.by_knots(samples, spins[:, None], rows[:, None])
     return by_knots
 
 

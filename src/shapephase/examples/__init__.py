@@ -1,7 +1,7 @@
 """Worked examples: motions of the bodies that come with the library, and the deformations of Cabrera's paper.
 
 `MOTIONS` has the falling cat, the astronaut and the satellite by name, each a path of joints; `EXAMPLES` deformations
-with a momentum and what is known of the motion they make; `slow_antenna` and its companions measure how near a slow
+with a momentum and what is known of the motion they make; `slow_antenna` and `first_loop` show how near a slow
 deformation is to a rigid body.
 """
 

@@ -24,7 +24,6 @@ from .example_deformations import (
     rigid_body,
 )
 from .scenarios import (
-    CLOSED_ORBITS,
     MOTIONS,
     NamedMotion,
     antenna_deployment,
@@ -32,7 +31,6 @@ from .scenarios import (
     astronaut_leg_swing,
     cat_righting,
     cat_righting_twist,
-    closed_orbit,
     diver_twist,
     five_stage_dive,
     full_dive,
@@ -40,16 +38,9 @@ from .scenarios import (
     named_motion,
     satellite_sweep,
 )
-from .slow_deformation import (
-    adiabatic_precession,
-    first_loop,
-    orbit_of_area,
-    slow_antenna,
-    slow_phase_slope,
-)
+from .slow_deformation import first_loop, slow_antenna
 
 __all__ = [
-    "CLOSED_ORBITS",
     "EXAMPLES",
     "MOTIONS",
     "AxialMotion",
@@ -59,7 +50,6 @@ __all__ = [
     "Scale",
     "SteadyTurn",
     "TimeReparametrisedRigid",
-    "adiabatic_precession",
     "antenna_deployment",
     "astronaut",
     "astronaut_arm_circles",
@@ -69,7 +59,6 @@ __all__ = [
     "cat",
     "cat_righting",
     "cat_righting_twist",
-    "closed_orbit",
     "dipole_antenna",
     "diver_twist",
     "expansion",
@@ -82,12 +71,10 @@ __all__ = [
     "linked_pentagon",
     "named_example",
     "named_motion",
-    "orbit_of_area",
     "printed_antenna",
     "pulsation",
     "regime_crossing",
     "rigid_body",
     "satellite_sweep",
     "slow_antenna",
-    "slow_phase_slope",
 ]

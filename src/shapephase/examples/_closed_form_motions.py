@@ -8,7 +8,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import quad_vec
 from scipy.optimize import root_scalar
 
 from .. import so3
@@ -16,13 +15,11 @@ from ..arguments import number_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation, prescribed
 from ..display import short_repr
-from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
+from ..errors import ShapeError, TrajectoryError
 from ..letters import value_text
 from ..rigid_body.euler_top import EulerTop
 
 _MAX_STRETCH = 2.0**30  # of the first guess of a time, up to which a function has to reach its target
-_QUADRATURE = 1e-11  # relative error of the clock by quadrature; closed forms are compared to about 1e-10
-_QUADRATURE_GOAL = 1e-14  # absolute [s] and relative: as near to rounding as it gets
 _CHECK_STEP = 1e-7  # of the duration, for differences of a given clock: their error is about 1e-9
 _CHECK_RATE = 1e-3  # of the rate of a given clock: finds any wrong formula, and passes an interpolated clock
 _CHECK_START = 1e-9  # of the duration, for the start of a given clock
@@ -141,11 +138,11 @@ class Scale:
     Attributes
     ----------
     factor : times (...) -> (...), above 0
-    clock : times (...) -> (...) [s]; None: by quadrature
+    clock : times (...) -> (...) [s]
     """
 
     factor: Callable[[Array], ArrayLike]
-    clock: Callable[[Array], Array] | None = None
+    clock: Callable[[Array], Array]
 
     __repr__ = short_repr
 
@@ -220,8 +217,6 @@ def diagonal(moments: Callable[[Array], Array], duration: float, breaks: ArrayLi
 
 def clock_of(scale: Scale, duration: float) -> Callable[[Array], Array]:
     """The clock of a scale. Raises TrajectoryError if the given one is not the integral of a^-2."""
-    if scale.clock is None:
-        return _clock_by_quadrature(scale.at)
     times, step = duration * np.array([0.123, 0.456, 0.789]), _CHECK_STEP * duration
     rate = (scale.clock(times + step) - scale.clock(times - step)) / (2.0 * step)
     start = float(scale.clock(np.zeros(())))
@@ -229,25 +224,9 @@ def clock_of(scale: Scale, duration: float) -> Callable[[Array], Array]:
     if abs(start) > _CHECK_START * duration or not np.allclose(ratio, 1.0, rtol=0.0, atol=_CHECK_RATE):
         raise TrajectoryError(
             f"the clock of the scale must be the integral of a^-2 from 0; it starts at {start:.6g} s and runs "
-            f"{ratio} times as fast at t = {times} s; leave it out to have it computed"
+            f"{ratio} times as fast at t = {times} s"
         )
     return scale.clock
-
-
-def _clock_by_quadrature(factor: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """The integral of a^-2 from 0 to t, for all times in one adaptive quadrature."""
-
-    def clock(times: Array) -> Array:
-        goal = _QUADRATURE_GOAL
-        value, error = quad_vec(lambda s: times * factor(times * s) ** -2.0, 0.0, 1.0, goal, goal, limit=500)
-        scale = np.linalg.norm(value) + 1.0
-        if not error <= _QUADRATURE * scale:
-            raise AccuracyNotReached(
-                f"the scale is too rough for quadrature: its clock is known only to {error:.3g} s; give the clock"
-            )
-        return value
-
-    return clock
 
 
 def first_time(function: Callable[[Array], Array], target: float, guess: float) -> float:

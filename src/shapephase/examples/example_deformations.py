@@ -72,8 +72,6 @@ def homothety(
     ------
     TrajectoryError
         If Pi never comes back and no duration is given, or the clock does not belong to the scale.
-    AccuracyNotReached
-        If the scale has no clock and is too rough for quadrature.
 
     Notes
     -----

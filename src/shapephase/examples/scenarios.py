@@ -15,11 +15,8 @@ from ..body.body import Body
 from ..body.loading import as_body_or_particles, load_body
 from ..body.particles.point_masses import ParticleBody
 from ..deformation.deformation import articulated
-from ..deformation.gauge import horizontal_gauge
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
-from ..phases.return_map import closed_orbits
-from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import Curve, Swings
 from ..shape_space.files.read import read_shape_path
 from ..shape_space.shape_path import ShapePath
@@ -27,7 +24,6 @@ from ._closed_form_motions import Example
 
 _WAIST = ("waist_pitch", "waist_yaw", "waist_roll")  # joints of both cats, in the order of their angles
 _BEND = _WAIST[:2]  # joints of the waist that cannot twist
-_TOLERANCE = 1e-11  # [rad] of a closed orbit: its phases are then good to ten digits
 _ARM_UP, _ARM_DOWN = 3.0, 0.2  # [rad]
 # Shares of a simple dive: an arm moves, and half of its stay below.
 _ARM_MOVES, _ARM_STAYS = 0.2, 0.13155869448710526
@@ -333,13 +329,6 @@ MOTIONS: Mapping[str, NamedMotion] = {
     ),
 }
 
-# Motions whose shape and momentum close together: the loop of shapes, and the momentum's magnitude [kg m^2/s].
-CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {
-    "cat": ("cat_righting", 0.005),
-    "astronaut": ("astronaut_leg_swing", 2.0),
-    "satellite": ("satellite_sweep", 1.0),
-}
-
 
 def named_motion(name: str, body: Body | ParticleBody | str | None = None) -> ShapePath:
     """The path of one of `MOTIONS`, whose `attitude` is how it begins, or of a recording.
@@ -375,38 +364,6 @@ def named_motion(name: str, body: Body | ParticleBody | str | None = None) -> Sh
         hint = f"; of {body.name} there is {', '.join(fitting)}" if fitting else ""
         raise ShapeError(f"{name} is a motion of {owner}, whose joints {body.name} does not have{hint}")
     return path
-
-
-def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
-    """A motion of `CLOSED_ORBITS`: shape and momentum close together, so that its split has only phase and holonomy.
-
-    Parameters
-    ----------
-    gauge : in which the momentum closes: "horizontal", so that total_rotation = exp(montgomery_phase hat(mu)) holonomy,
-        or "base", so that total_rotation = exp(montgomery_phase hat(mu))
-
-    Returns
-    -------
-    the first of `closed_orbits`, in the base gauge: `split(closed_orbit("cat"))` has no tilt of the closing
-
-    Raises
-    ------
-    UnknownNameError
-        For an unknown name or gauge.
-
-    Examples
-    --------
-    >>> motion = sp.examples.closed_orbit("cat")
-    >>> print(f"{sp.split(motion).momentum_gap:.6f}")
-    0.000000
-    """
-    check_choice(name, "closed orbit", CLOSED_ORBITS)
-    check_choice(gauge, "gauge of a closed orbit", ("horizontal", "base"))
-    motion, magnitude = CLOSED_ORBITS[name]
-    deformation = articulated(load_body(MOTIONS[motion].body), named_motion(motion))
-    gauged = horizontal_gauge(deformation) if gauge == "horizontal" else deformation
-    start = closed_orbits(gauged, magnitude)[0].initial_attitude
-    return reconstruct(deformation, [0.0, 0.0, magnitude], start, tolerance=_TOLERANCE)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -50,35 +49,6 @@ class ResolvedPath:
         lowest = 1 + np.sum(sums[:, 2:] > tolerance, axis=1)
         moves = self.coefficients[:, :, self._n_shape :].any(axis=(1, 2)) | (sums[:, 1] > _AT_REST)
         return np.where(moves, lowest, 0)
-
-    def reversed(self) -> ResolvedPath:
-        """Return the path in the opposite order of time."""
-        coefficients = self.coefficients[::-1] * np.where(np.arange(DEGREE + 1) % 2, -1.0, 1.0)[:, None]
-        coefficients[:, :, self._n_shape :] *= -1.0
-        return replace(
-            self,
-            left=self.duration - self.right[::-1],
-            right=self.duration - self.left[::-1],
-            coefficients=coefficients,
-            noise=self.noise[::-1],
-        )
-
-    def stretched(self, factor: float) -> ResolvedPath:
-        """Return the path `factor` times as slowly."""
-        coefficients = self.coefficients.copy()
-        coefficients[:, :, self._n_shape :] /= factor
-        return replace(
-            self,
-            left=self.left * factor,
-            right=self.right * factor,
-            coefficients=coefficients,
-            duration=self.duration * factor,
-        )
-
-    def reordered(self, order: Integers) -> ResolvedPath:
-        """Return the path with its joints in another order."""
-        columns = np.concatenate([order, self._n_shape + order])
-        return replace(self, coefficients=self.coefficients[:, :, columns])
 
     @property
     def _n_shape(self) -> int:

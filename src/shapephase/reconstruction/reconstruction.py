@@ -448,8 +448,8 @@ def reconstruct(
         axes of both broadcast.
     tolerance : largest attitude error over the whole interval, between 1e-13 and 1e-4 [rad]
     method : "auto" or "spectral" (the deformation sampled at Chebyshev points, the attitude stepped on the interpolant
-        by a Runge-Kutta method of order 8), "closed_form" (a rigid body by elliptic functions:
-        `rigid_body.EulerTop`), or "dop853" (SciPy's integrator on the deformation itself, an independent check)
+        by a Runge-Kutta method of order 8), or "dop853" (SciPy's integrator on the deformation itself, an independent
+        check)
     threads : largest number of threads for many momenta; None: one for each processor. Results do not depend on it
     progress : called some two hundred times in a long run as `progress(share, text)`: the share that is done, from 0
         to 1, which never falls, and what is being done; a true return stops the run
@@ -459,7 +459,7 @@ def reconstruct(
     Raises
     ------
     ShapeError, UnknownNameError
-        For arguments of the wrong shape, an unknown method, or "closed_form" for a deformation not made by `rigid`.
+        For arguments of the wrong shape, or an unknown method.
     SingularInertiaError
         If the locked inertia is not positive definite somewhere.
     AccuracyNotReached

@@ -201,7 +201,7 @@ class HeldMotions:
         for place, columns in enumerate(self.columns.values()):
             own[list(columns)] |= bool(mask >> place & 1)
         curve = _Mixed(moving.curve, baseline.curve, own)
-        path = replace(moving, curve=curve, breaks=breaks, loops=loops, scanner=None, origin=None)
+        path = replace(moving, curve=curve, breaks=breaks, loops=loops, origin=None)
         has_own_wheels = WHEELS not in self.conditions or bool(mask >> self.names.index(WHEELS) & 1)
         return deformation_along(body, path, _wheels_of(body, self._rotors[not has_own_wheels], path.duration))
 

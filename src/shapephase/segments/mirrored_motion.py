@@ -48,7 +48,7 @@ def mirrored_motion(motion: Motion, **axes: Any) -> Motion:
         raise ShapeError("baseline: a body with wheels has no mirrored motion; give another motion, or a posture")
     lateral = motion.athlete_axes(**{key: value for key, value in axes.items() if value is not None}).lateral
     images, signs = _mirror_images(body, lateral)
-    mirrored = replace(path, curve=_Exchanged(path.curve, images, signs), scanner=None, origin=None)
+    mirrored = replace(path, curve=_Exchanged(path.curve, images, signs), origin=None)
     return reconstruct(
         articulated(body, mirrored), motion.momentum, motion.initial_attitude, tolerance=motion.tolerance
     )

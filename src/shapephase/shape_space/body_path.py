@@ -104,14 +104,14 @@ def path_sampler(body: Body | ParticleBody, path: ShapePath) -> Sampler:
     """A sampler of the body along a path whose columns are in the body's order."""
 
     def evaluate(times: Array) -> tuple[Array, Array]:
-        return body.sample(*path.at_samples(times))
+        return body.sample(*path.curve(times))
 
     return Sampler(evaluate, path.smoothness, partial(channels_along, body, path))
 
 
 def channels_along(body: Body | ParticleBody, path: ShapePath, times: Array) -> Array | None:
     """`channels_at` along a path: (N,) -> (N, 9)."""
-    return channels_at(body, *path.at_samples(times))
+    return channels_at(body, *path.curve(times))
 
 
 def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array | None:

@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_picklable
-from ..arrays import Array, Integers, Mask, check_reach, lock_arrays, read_only, real_array
+from ..arrays import Array, Integers, Mask, check_reach, lock_arrays, real_array
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 
 CLOSED = 1e-9  # [rad or m] largest gap of a loop: files are written with ten digits or more
 _WHOLE_TURN = 2.0 * np.pi
 _MOST_REPEATED = 100_000  # knots of a repeated loop that are written out
-_MOST_KEPT = 32  # sets of times with kept values; with the next number, 16 MB
-_MOST_NUMBERS = 2_000_000
 
 
 class Curve(Protocol):
@@ -46,31 +44,6 @@ def most_swings(counts: Sequence[float | None]) -> float | None:
     """Return the largest of some upper bounds; None where one is unknown."""
     known = [count for count in counts if count is not None]
     return max(known, default=0.0) if len(known) == len(counts) else None
-
-
-class KeptValues:
-    """Values of a curve at sets of times that are used repeatedly; all are dropped when there are too many."""
-
-    def __init__(self) -> None:
-        self._known: dict[bytes, tuple[Array, Array]] = {}
-
-    def __call__(self, curve: Curve, times: Array) -> tuple[Array, Array]:
-        """Shapes and rates, read-only: (N,) -> (N, n), (N, n)."""
-        key = times.tobytes()
-        values = self._known.get(key)
-        if values is None:
-            shapes, rates = curve(times)
-            values = read_only(shapes), read_only(rates)
-            each = _MOST_NUMBERS // _MOST_KEPT
-            if 2 * values[0].size <= each:
-                if len(self._known) >= _MOST_KEPT:
-                    self._known.clear()
-                self._known[key] = values
-        return values
-
-    def __getstate__(self) -> dict[str, object]:
-        """Values are not pickled."""
-        return {"_known": {}}
 
 
 class _Known:

@@ -40,7 +40,7 @@ def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
     drivers = np.isin(np.array(body.joint_names, dtype=str), follows.drivers)
     if route.loops > 1 and (np.abs(route.gap[drivers]) > CLOSED).any():
         # What follows by a curve is elsewhere in the next loop.
-        route = replace(route, breaks=_loop_ends(route), loops=1, scanner=None)
+        route = replace(route, breaks=_loop_ends(route), loops=1)
     if follows.is_smooth:
         return route
     crossings = crossing_times(follows, route.curve, panel_edges(route))
@@ -49,7 +49,7 @@ def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
     known = merged(route.smoothness.breaks, _loop_ends(route))
     starts = route.duration / route.loops * np.arange(route.loops)
     breaks = merged(known, (starts[:, None] + crossings).ravel())
-    return replace(route, breaks=breaks, scanner=None)
+    return replace(route, breaks=breaks)
 
 
 def _check_signs(ball: BallJoint, route: ShapePath) -> None:

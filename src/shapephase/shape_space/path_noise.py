@@ -79,7 +79,7 @@ def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = 
     Raises
     ------
     WrongObjectError
-        If the path was not put through samples, or a geodesic closes it; without `joints`, if no noise was stated.
+        If the path was not put through samples; without `joints`, if no noise was stated.
     ShapeError
         For a noise of another length, or below zero.
     TrajectoryError
@@ -101,7 +101,7 @@ def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = 
     """
     path = as_path(path)
     times = times_argument(t, path.duration).ravel()
-    samples, levels = _samples(path), _levels(path, joints)
+    samples, levels = path_samples(path), _levels(path, joints)
     rows = max(samples.count * path.n_shape, samples.curve.coefficients[..., 0].size)
     chunks = np.array_split(times, max(1, -(-3 * len(times) * rows // _MOST_NUMBERS)))
     parts = [_errors(samples, part, levels) for part in chunks if len(part)]
@@ -112,24 +112,13 @@ def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = 
 def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: ArrayLike | None = None) -> Array:
     """Standard deviations of sums over times (N,) of (N, m, n, 3) derivatives by shape, rate and acceleration: (m,)."""
     check_object(path, "ShapePath", "path")
-    samples, levels = _samples(path), _levels(path, joints)
+    samples, levels = path_samples(path), _levels(path, joints)
     by_knots = np.einsum("tmja,atk->mkj", derivative, samples.rows_by_knots(times)).reshape(derivative.shape[1], -1)
     variance = (by_knots @ samples.bias) ** 2
     for rule in samples.rules:
         answers = rule(by_knots).reshape(len(by_knots), -1, path.n_shape) * levels
         variance += (answers**2).sum(axis=(1, 2))
     return np.sqrt(variance)
-
-
-def _samples(path: ShapePath) -> PathSamples:
-    """Samples of a path. Raises WrongObjectError where it was put through none, or a geodesic couples its joints."""
-    samples = path_samples(path)
-    if samples.arc is not None:
-        raise WrongObjectError(
-            "error bars of rates are not known of a path that a geodesic closes; close it by drift or smooth "
-            "(close_by, --close-by)"
-        )
-    return samples
 
 
 def stated_noise(path: ShapePath) -> Array | None:

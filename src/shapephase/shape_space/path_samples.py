@@ -4,38 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, cast
+from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Integers, Mask
+from ..arrays import Array, Integers
 from ..errors import WrongObjectError
 from .curves import PiecewisePolynomial, Reordered
 from .interpolation import REST_TO_REST
-from .shape_geodesic import ClosingArc
-from .shape_path import PathOrigin, ShapePath, interpolated, without_joints
-
-
-class SampleOrigin(PathOrigin, Protocol):
-    """Steps from recorded samples, closed, smoothed or resampled, to values at the knots of a path."""
-
-    @property
-    def samples(self) -> Array:
-        """Samples as they were recorded: (N, n) [rad or m]."""
-        ...
-
-    @property
-    def bias(self) -> Array:
-        """Known bias of smoothing: (knots, n) [rad or m]."""
-        ...
-
-    def by_samples(self, by_values: Array, /) -> Array:
-        """Convert m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
-        ...
-
-    def bias_by_samples(self, by_values: Array, /) -> Array:
-        """Convert m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
-        ...
+from .shape_path import SampleOrigin, ShapePath, interpolated, without_joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +22,11 @@ class PathSamples:
     curve : the polynomials through the samples, or through what was made of them
     order : (n,) which column of theirs is which of the path's
     origin : how the values at their knots follow from the samples; None: they are the samples
-    arc : the geodesic that the last of the polynomials are, behind those through samples; None: none
     """
 
     curve: PiecewisePolynomial
     order: Integers
     origin: SampleOrigin | None
-    arc: ClosingArc | None
 
     @property
     def count(self) -> int:
@@ -63,8 +38,7 @@ class PathSamples:
         """(count, n) [rad or m]."""
         if self.origin is not None:
             return self.origin.samples[:, self.order]
-        source = self._source
-        return source(source.knots[: self._at_knots])[0][:, self.order]
+        return self.curve(self.curve.knots[: self._at_knots])[0][:, self.order]
 
     @property
     def bias(self) -> Array:
@@ -75,26 +49,16 @@ class PathSamples:
 
     @property
     def _at_knots(self) -> int:
-        return len(self._source.knots) - (self._source.through == "periodic")
-
-    @property
-    def _source(self) -> PiecewisePolynomial:
-        """The polynomials through samples: those before a closing geodesic."""
-        if self.arc is None:
-            return self.curve
-        curve = self.arc.opened.curve
-        assert isinstance(curve, PiecewisePolynomial)
-        return curve
+        return len(self.curve.knots) - (self.curve.through == "periodic")
 
     def path_through(self, values: Array) -> ShapePath:
         """The path of the same kind through other samples (count, n), made of them in the same way."""
-        origin = self.arc or self.origin
-        if origin is None:
+        if self.origin is None:
             return interpolated(self.curve.knots, values, self.curve.through)
         # The path may lack joints of the recording, as wheels.
-        recorded = values.copy() if self.origin is None else self.origin.samples.copy()
+        recorded = self.origin.samples.copy()
         recorded[:, self.order] = values
-        whole = origin.path(recorded)
+        whole = self.origin.path(recorded)
         kept = {*self.order.tolist()}
         return without_joints(whole, [name for k, name in enumerate(whole.joint_names or ()) if k not in kept])
 
@@ -131,11 +95,7 @@ class PathSamples:
         return piece, rows
 
     def rows_by_knots(self, times: Array) -> Array:
-        """Shape, rate and acceleration of a joint at times (N,), by its own values at the knots: (3, N, knots).
-
-        No geodesic closes the path: that would couple the joints.
-        """
-        assert self.arc is None
+        """Shape, rate and acceleration of a joint at times (N,), by its own values at the knots: (3, N, knots)."""
         (pieces, rows), count = self._basis(times), len(times)
         order, total, _ = self.curve.coefficients.shape
         by_coefficients = np.zeros((order, total, 3, count))
@@ -145,29 +105,11 @@ class PathSamples:
 
     def by_knots_of(self, by_coefficients: Array) -> Array:
         """Convert derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
-        curve, (order, _, count, n_shape) = self._source, by_coefficients.shape
+        curve, (order, pieces, count, n_shape) = self.curve, by_coefficients.shape
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
-        given = by_coefficients[:, : len(curve.knots) - 1].reshape(order, len(curve.knots) - 1, -1)
+        given = by_coefficients.reshape(order, pieces, -1)
         by_knots = rule(np.diff(curve.knots), given, curve.through == "periodic").reshape(-1, count, n_shape)
-        if self.arc is not None:
-            by_cubics = np.empty_like(by_coefficients[:, len(curve.knots) - 1 :])
-            by_cubics[..., self.order] = by_coefficients[:, len(curve.knots) - 1 :]
-            by_knots[[0, -1]] += self.arc.by_ends(by_cubics)[..., self.order]
         return np.moveaxis(by_knots, 0, 1).reshape(count, -1)
-
-    def is_closing(self, times: Array) -> Mask:
-        """True for times on a geodesic that closes the path, whose duration follows from the path: (N,)."""
-        return times > self._source.knots[-1] if self.arc is not None else np.zeros(len(times), dtype=bool)
-
-    def seconds_by_knots(self) -> Array:
-        """The derivatives of the logarithm of that duration by the values at the knots: (knots n,)."""
-        arc = self.arc
-        assert arc is not None
-        by_ends, by_shape, by_rate = arc.seconds_by_path()
-        opened = PathSamples(self._source, np.arange(len(self.order)), self.origin, None)
-        by_knots = opened.by_knots(arc.opened.breaks, by_shape[:, None], by_rate[:, None]).reshape(-1, len(self.order))
-        by_knots[[0, -1]] += by_ends
-        return (by_knots[:, self.order] / arc.seconds).ravel()
 
     def by_samples(self, by_knots: Array) -> Array:
         """Convert derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
@@ -187,7 +129,7 @@ class PathSamples:
 
     def _through(self, rule: Callable[[Array], Array], by_knots: Array) -> Array:
         n_shape = len(self.order)
-        of_curve = np.zeros((self._at_knots, len(by_knots), self._source.coefficients.shape[2]))
+        of_curve = np.zeros((self._at_knots, len(by_knots), self.curve.coefficients.shape[2]))
         of_curve[:, :, self.order] = np.moveaxis(by_knots.reshape(len(by_knots), -1, n_shape), 1, 0)
         return np.moveaxis(rule(of_curve)[:, :, self.order], 0, 1).reshape(len(by_knots), -1)
 
@@ -203,15 +145,12 @@ def path_samples(path: ShapePath) -> PathSamples:
     curve, order = path.curve, np.arange(path.n_shape)
     while isinstance(curve, Reordered):
         curve, order = curve.curve, curve.order[order]
-    arc = path.origin if isinstance(path.origin, ClosingArc) else None
-    if not isinstance(curve, PiecewisePolynomial) or (curve.through is None and arc is None):
+    if not isinstance(curve, PiecewisePolynomial) or curve.through is None:
         raise WrongObjectError(
             "this path was not put through samples: derivatives by samples are those of ShapePath.spline, "
-            "ShapePath.waypoints and of recorded motions; of those that a geodesic closes, not if they were resampled"
+            "ShapePath.waypoints and of recorded motions"
         )
-    # A geodesic closes a path that is open: every other origin has the values at the knots.
-    origin = cast("SampleOrigin | None", arc.opened.origin if arc else path.origin)
-    return PathSamples(curve, order, origin, arc)
+    return PathSamples(curve, order, path.origin)
 
 
 def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
@@ -239,9 +178,8 @@ def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
     by_slope[1:] += by_third - by_second
     if periodic:
         by_slope[0] += by_slope[-1]
-        by_mean += _by_means_of_loop(widths, by_slope[:-1])
-    else:
-        by_mean += _by_means(widths, by_slope)
+        by_slope = by_slope[:-1]
+    by_mean += _by_means(widths, by_slope, periodic)
     by_mean /= h
     by_knots[:-1] += by_coefficients[0] - by_mean
     by_knots[1:] += by_mean
@@ -251,60 +189,32 @@ def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
     return by_knots
 
 
-def _by_means(h: Array, by_slopes: Array) -> Array:
-    """Convert derivatives by the slopes at the knots to those by the mean slopes: (pieces + 1, m) -> (pieces, m).
+def _by_means(h: Array, by_slopes: Array, periodic: bool) -> Array:
+    """Convert derivatives by the slopes at the knots to those by the mean slopes: (knots, m) -> (pieces, m).
 
-    Between the ends h_after s_before + 2 (h_before + h_after) s + h_before s_after is 3 (h_after m_before + h_before
-    m_after); the first two pieces, and the last two, are one cubic, of two pieces one parabola, of one a line.
+    At a knot h_after s_before + 2 (h_before + h_after) s + h_before s_after is 3 (h_after m_before + h_before m_after).
+    Without a period the first two pieces, and the last two, are one cubic, of two pieces one parabola, of one a line.
     """
-    pieces = len(h)
-    if pieces == 1:
-        return by_slopes[:1] + by_slopes[1:]
-    before, after = h[:-1], h[1:]
-    diagonal = np.concatenate([[1.0], 2.0 * (before + after), [1.0]])
-    if pieces == 2:
-        # The second derivative at the ends is the one of the whole parabola.
-        next_ones, of_means = (1.0, 1.0), ((2.0, 0.0), (2.0, 0.0))
-    else:
-        ends = (h[0], h[1]), (h[-1], h[-2])
-        diagonal[[0, -1]] = h[[1, -2]]
-        next_ones = tuple(near + far for near, far in ends)
-        of_means = tuple(
-            ((near + 2.0 * (near + far)) * far / (near + far), near * near / (near + far)) for near, far in ends
-        )
-    lower, upper = np.append(after, next_ones[1]), np.append(next_ones[0], before)
-    # In the transposed equations the upper diagonal is the lower one.
-    answers = _tridiagonal(upper, diagonal, lower, by_slopes)
-    by_means = np.zeros((pieces, by_slopes.shape[1]))
-    by_means[:-1] += 3.0 * after[:, None] * answers[1:-1]
-    by_means[1:] += 3.0 * before[:, None] * answers[1:-1]
-    for end, inward, factors in ((0, 1, of_means[0]), (-1, -1, of_means[1])):
-        by_means[end] += factors[0] * answers[end]
-        by_means[end + inward] += factors[1] * answers[end]
-    return by_means
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import splu
 
+    pieces, count = len(h), len(by_slopes)
+    knots = np.arange(count) if periodic else np.arange(1, count - 1)
+    before, after = h[knots - 1], h[knots % pieces]
+    slopes = [(knots, knots - 1, after), (knots, knots, 2.0 * (before + after)), (knots, knots + 1, before)]
+    means = [(knots, knots - 1, 3.0 * after), (knots, knots, 3.0 * before)]
+    for knot, inward in () if periodic else ((0, 1), (count - 1, -1)):
+        piece = 0 if knot == 0 else pieces - 1
+        near, far = h[piece], h[piece + inward] if pieces > 1 else 0.0
+        both = near + far
+        weights = {1: (1.0, 0.0, 1.0, 0.0), 2: (1.0, 1.0, 2.0, 0.0)}
+        own, other, here, there = weights.get(pieces, (far, both, far * (near + 2.0 * both) / both, near**2 / both))
+        slopes += [(knot, knot, own), (knot, knot + inward, other)]
+        means += [(knot, piece, here), (knot, piece + inward, there)]
 
-def _by_means_of_loop(h: Array, by_slopes: Array) -> Array:
-    """`_by_means` of a periodic spline: (pieces, m) -> (pieces, m)."""
-    before = np.roll(h, 1)[:, None]
-    after, diagonal = h[:, None], 2.0 * (h + before[:, 0])
-    # The first and the last equation are coupled, too: the corners are taken off as a product of two vectors, and put
-    # back by the solution for one more right side.
-    corner = -diagonal[0]
-    ends = np.zeros(len(h))
-    ends[0], ends[-1] = corner, h[0]
-    diagonal[0] -= corner
-    diagonal[-1] -= h[0] * h[-2] / corner
-    whole = _tridiagonal(before[:-1, 0], diagonal, after[1:, 0], np.column_stack([by_slopes, ends]))
-    across = whole[0] + h[-2] / corner * whole[-1]
-    answers = whole[:, :-1] - whole[:, -1:] * (across[:-1] / (1.0 + across[-1]))
-    weighted = 3.0 * before * answers
-    return np.roll(3.0 * after * answers, -1, axis=0) + weighted
+    def matrix(entries: list[tuple[Any, Any, Any]], columns: int) -> Any:
+        rows, places, values = (np.concatenate([np.atleast_1d(part) for part in parts]) for parts in zip(*entries))
+        return coo_array((values, (rows, places % columns)), shape=(count, columns))
 
-
-def _tridiagonal(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:
-    """The solution of equations with three diagonals: (k - 1,), (k,), (k - 1,), (k, m) -> (k, m)."""
-    from scipy.linalg import get_lapack_funcs
-
-    (solve,) = get_lapack_funcs(("gtsv",), dtype=np.float64)
-    return np.asarray(solve(lower, diagonal, upper, right)[3], dtype=np.float64)
+    answers = splu(matrix(slopes, count).T.tocsc()).solve(by_slopes)
+    return np.asarray(matrix(means, pieces).T @ answers, dtype=np.float64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -33,7 +33,6 @@ from .curves import (
     Function,
     Interpolation,
     Joined,
-    KeptValues,
     Multiplied,
     PiecewisePolynomial,
     Reordered,
@@ -56,14 +55,32 @@ from .interpolation import (
     spline_curve,
 )
 from .path_series import SAME_TIME, resolved_accelerations, spline_times
-from .scan.function_scan import DerivedScan, FunctionScan, JoinedScan, check_rates, path_function
+from .scan.function_scan import FunctionScan, check_rates, path_function
 from .scan.scanning import scanned
 
 _WHOLE_TURN = 2.0 * np.pi
 
 
-class PathOrigin(Protocol):
-    """Steps from recorded samples, smoothed, resampled or closed, to a path."""
+class SampleOrigin(Protocol):
+    """Steps from recorded samples, closed, smoothed or resampled, to values at the knots of a path."""
+
+    @property
+    def samples(self) -> Array:
+        """Samples as they were recorded: (N, n) [rad or m]."""
+        ...
+
+    @property
+    def bias(self) -> Array:
+        """Known bias of smoothing: (knots, n) [rad or m]."""
+        ...
+
+    def by_samples(self, by_values: Array, /) -> Array:
+        """Convert m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        ...
+
+    def bias_by_samples(self, by_values: Array, /) -> Array:
+        """Convert m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        ...
 
     def path(self, samples: Array, /) -> ShapePath:
         """Return the path that the same steps make of other samples (N, n)."""
@@ -88,7 +105,6 @@ class ShapePath:
     loops : the path is its first `duration / loops` seconds, this many times
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
-    scanner : derives `scan` from the scan of the path that this one was made of; None: the path itself is scanned
     origin : how it follows from recorded samples; None: these are the values at its knots, or there are none
 
     Examples
@@ -106,9 +122,7 @@ class ShapePath:
     loops: int = 1
     sha256: str | None = None
     record: Mapping[str, Any] | None = None
-    scanner: Callable[[], FunctionScan] | None = None
-    origin: PathOrigin | None = None
-    _seen: KeptValues = field(default_factory=KeptValues, init=False, repr=False)
+    origin: SampleOrigin | None = None
 
     __repr__, _repr_html_ = card_text, card_html
 
@@ -265,10 +279,6 @@ class ShapePath:
             accelerations = resolved_accelerations(self._scan.resolved, self.loops, times.ravel())
         return accelerations.reshape(*times.shape, self.n_shape)
 
-    def at_samples(self, times: Array) -> tuple[Array, Array]:
-        """Shapes and rates at times at which a body is sampled, read-only: kept for the next momentum or body."""
-        return self._seen(self.curve, times)
-
     @cached_property
     def swings(self) -> Swings:
         """Largest number of swings between two breaks, and whether one loop goes on smoothly in the next."""
@@ -296,7 +306,7 @@ class ShapePath:
 
     @property
     def scan(self) -> FunctionScan | None:
-        """Scan of the first loop of a path known only as a function, kept for paths made of it; else None.
+        """Scan of the first loop of a path known only as a function; else None.
 
         Raises
         ------
@@ -314,8 +324,6 @@ class ShapePath:
 
     @cached_property
     def _scan(self) -> FunctionScan:
-        if self.scanner is not None:
-            return self.scanner()
         period = self.duration / self.loops
         edges = self.breaks[self.breaks <= period * (1.0 + SAME_TIME)]
         return scanned(path_function(self.curve, self.n_shape, self.joint_names), edges)
@@ -331,7 +339,7 @@ class ShapePath:
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
         curve = Retimed(self.curve, self.duration)
-        return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"), origin=None)
+        return replace(self, curve=curve, breaks=breaks, origin=None)
 
     def stretched(self, factor: float) -> ShapePath:
         """The path `factor` times as slowly."""
@@ -340,8 +348,7 @@ class ShapePath:
         breaks = self.breaks * scale
         breaks[-1] = duration
         curve = Retimed(self.curve, self.duration, scale)
-        scanner = DerivedScan(self, "stretched", (scale,))
-        return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner, origin=None)
+        return replace(self, curve=curve, duration=duration, breaks=breaks, origin=None)
 
     def then(self, other: ShapePath) -> ShapePath:
         """Join another path to the end of this one.
@@ -376,8 +383,7 @@ class ShapePath:
         breaks[-1] = duration
         following = other.curve if np.all(factors == 1.0) else Multiplied(other.curve, factors)
         curve = Joined(self.curve, self.duration, following, other.duration, offset)
-        scanner = JoinedScan([self, other]) if following is other.curve else None
-        return ShapePath(curve, duration, breaks, self.n_shape, names, scanner=scanner)
+        return ShapePath(curve, duration, breaks, self.n_shape, names)
 
     def repeated(self, count: int) -> ShapePath:
         """The loop `count` times in a row.
@@ -407,7 +413,6 @@ class ShapePath:
             duration=count * self.duration,
             breaks=breaks,
             loops=self.loops * int(count),
-            scanner=DerivedScan(self),
             origin=None,
         )
 
@@ -452,7 +457,7 @@ class ShapePath:
             return self
         order = np.array([self.joint_names.index(name) for name in expected])
         curve = Reordered(self.curve, order)
-        return replace(self, curve=curve, joint_names=expected, scanner=DerivedScan(self, "reordered", (order,)))
+        return replace(self, curve=curve, joint_names=expected)
 
     def _card(self) -> Card:
         """Duration, joints that move, widest joint and closure, with a picture of the joints in time."""
@@ -486,9 +491,8 @@ def without_joints(path: ShapePath, names: Collection[str]) -> ShapePath:
     if path.joint_names is None or len(kept) == path.n_shape:
         return path
     order, left = np.array(kept, dtype=int), tuple(path.joint_names[k] for k in kept)
-    scanner = DerivedScan(path, "reordered", (order,))
     curve = Reordered(path.curve, order)
-    return replace(path, curve=curve, n_shape=len(kept), joint_names=left, scanner=scanner)
+    return replace(path, curve=curve, n_shape=len(kept), joint_names=left)
 
 
 def interpolated(

@@ -255,24 +255,6 @@ def three(file, header, rows=((0.0, 0.1, 0.2), (0.5, 0.3, 0.1), (1.0, 0.2, 0.4))
     return file
 
 
-def test_columns_are_renamed_and_left_out(tmp_path):
-    file = three(tmp_path / "m.csv", "t,a_deg,pelvis")
-    names = {"t": "time", "a_deg": LEFT, "pelvis": RIGHT}
-    # A column keeps its unit under another name.
-    path = read_shape_path(file, DIVER, names=names)
-    np.testing.assert_allclose(path.shape(0.5), [np.radians(0.3), 0.1], atol=1e-16, rtol=0)
-    file = three(tmp_path / "m.csv", "time,a_deg,pelvis")
-    del names["t"]
-    path = read_shape_path(file, DIVER, names=names)
-    np.testing.assert_allclose(path.shape(0.5), [np.radians(0.3), 0.1], atol=1e-16, rtol=0)
-    with pytest.warns(TrajectoryWarning, match=RIGHT):
-        read_shape_path(file, DIVER, names=names | {"pelvis": None})
-    with pytest.raises(UnknownNameError, match="'pelvis'"):
-        read_shape_path(file, DIVER, names=names | {"pelvi": None})
-    with pytest.raises(TrajectoryError, match="same"):
-        read_shape_path(file, DIVER, names=names | {"pelvis": LEFT})
-
-
 def test_degrees_by_argument_are_for_turning_joints_only(tmp_path):
     sample = Sample.random(SATELLITE)
     write_delimited(tmp_path / "m.csv", sample.names, sample.ns / NANO, sample.degrees)
@@ -290,18 +272,6 @@ def test_a_header_without_units_is_asked_about(tmp_path):
         read_shape_path(tmp_path / "m.mot", SATELLITE)
     path = read_shape_path(tmp_path / "m.mot", SATELLITE, degrees=False)
     np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-15, rtol=0)
-
-
-def test_what_looks_like_degrees_is_refused_until_it_is_said(tmp_path):
-    file = three(tmp_path / "m.csv", f"time,{LEFT},{RIGHT}", ((0.0, 0.0, 0.0), (1.0, 45.0, 90.0), (2.0, 0.0, 170.0)))
-    with pytest.raises(TrajectoryError, match=LEFT):
-        read_shape_path(file, DIVER)
-    path = read_shape_path(file, DIVER, degrees=True)
-    np.testing.assert_allclose(path.shape(1.0), np.radians([45.0, 90.0]), atol=1e-15, rtol=0)
-    with pytest.warns(TrajectoryWarning, match="limits") as seen:
-        path = read_shape_path(file, DIVER, degrees=False)
-    assert len(seen) == 1  # one line for both joints
-    np.testing.assert_allclose(path.shape(1.0), [45.0, 90.0], atol=1e-13, rtol=0)
 
 
 def test_what_closes_is_a_loop_unless_one_says_no(tmp_path):

@@ -109,18 +109,6 @@ def test_any_path_is_written_finely(tmp_path, diver):
     np.testing.assert_allclose(back.shape(t), loop.shape(t), atol=1e-8, rtol=0)
 
 
-def test_columns_in_any_order_and_in_degrees(tmp_path, diver):
-    (tmp_path / "a.csv").write_text(
-        "right_shoulder_abduction_deg, time ,left_shoulder_abduction\n90,10,0.5\n-45,10.5,0.25\n\n0,12,1\n"
-    )
-    path = sp.read_shape_path(tmp_path / "a.csv", diver)
-    assert path.duration == 2.0
-    left, right = diver.joint_index("left_shoulder_abduction"), diver.joint_index("right_shoulder_abduction")
-    shapes = path.shape([0.0, 0.5, 2.0])
-    np.testing.assert_allclose(shapes[:, left], [0.5, 0.25, 1.0], atol=1e-15, rtol=0)
-    np.testing.assert_allclose(shapes[:, right], np.radians([90, -45, 0]), atol=1e-15, rtol=0)
-
-
 GOOD = HEADER + "0,0,0\n1,1,1\n2,0,0\n"
 
 
@@ -155,14 +143,6 @@ def test_a_joint_that_does_not_exist_is_named_with_the_valid_ones(tmp_path, dive
     (tmp_path / "m.csv").write_text(GOOD.replace("left_shoulder_abduction", "left_sholder_abduction"))
     with pytest.raises(UnknownNameError, match="'left_shoulder_abduction'"):
         sp.read_shape_path(tmp_path / "m.csv", diver)
-
-
-def test_degrees_of_a_slide_are_refused(tmp_path, satellite):
-    header = ",".join(["time", *satellite.joint_names]).replace("boom_extension", "boom_extension_deg")
-    rows = [",".join([str(t)] + ["0"] * satellite.n_shape) for t in range(3)]
-    (tmp_path / "m.csv").write_text("\n".join([header, *rows]))
-    with pytest.raises(TrajectoryError, match="boom_extension"):
-        sp.read_shape_path(tmp_path / "m.csv", satellite)
 
 
 def test_files_that_are_not_there_or_no_motion(tmp_path, diver):

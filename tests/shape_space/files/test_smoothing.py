@@ -34,18 +34,6 @@ def smoother_of(path):
     return path.origin.smoother
 
 
-def jumps(path, order):
-    """The largest jump of a derivative of a piecewise cubic at its inner knots, from its coefficients."""
-    c, h = path.curve.coefficients, np.diff(path.breaks)[:, None]
-    before = {
-        0: c[0] + h * (c[1] + h * (c[2] + h * c[3])),
-        1: c[1] + h * (2 * c[2] + 3 * h * c[3]),
-        2: 2 * c[2] + 6 * h * c[3],
-    }[order]
-    after = {0: c[0], 1: c[1], 2: 2 * c[2]}[order]
-    return np.abs(before[:-1] - after[1:]).max(initial=0.0), np.abs(before[-1] - after[0]).max()
-
-
 def least_jerk(t, values, weights, penalty, periodic=True):
     """The quintic smoothing spline at its knots, of dense matrices: of the splines of degree five through unit samples
     the third derivatives are parabolas, whose squares Gauss's rule of three points sums exactly."""
@@ -180,33 +168,6 @@ def test_a_penalty_that_is_given_is_used_and_judged():
     for wrong in (-1.0, [0.1, 0.2, 0.3]):
         with pytest.raises(ShapeError, match="noise"):
             smoothed_path(t, shapes, wrong, False)
-
-
-@pytest.mark.parametrize("periodic", [False, True])
-def test_the_path_is_twice_continuously_differentiable(periodic):
-    t, shapes = noisy(0.03, even=True)
-    path, _ = smoothed_path(t, shapes, np.array([0.03, 0.02]), periodic, NAMES)
-    assert len(path.breaks) > 10
-    for order, tolerance in ((0, 1e-13), (1, 1e-11), (2, 1e-9)):
-        inner, end = jumps(path, order)
-        assert inner < tolerance
-        assert (end < tolerance) == periodic
-    # The rate is the derivative of the shape.
-    s = np.linspace(0.01, 2.99, 200)
-    np.testing.assert_allclose((path.shape(s + 1e-7) - path.shape(s - 1e-7)) / 2e-7, path.rate(s), atol=2e-7, rtol=0)
-
-
-def test_the_noise_goes_and_the_motion_stays():
-    noise = 0.01
-    t, shapes = noisy(noise, 2000, even=True)
-    s = np.linspace(0.0, 3.0, 3001)
-    shape, rate = loop(s)
-    through = sp.ShapePath.spline(t, shapes, periodic=False)
-    path, _ = smoothed_path(t, shapes, np.full(2, noise), True, NAMES)
-    assert np.sqrt(np.mean((path.shape(s) - shape) ** 2)) < 0.15 * noise
-    assert np.sqrt(np.mean((path.rate(s) - rate) ** 2)) < 0.06
-    # What the samples themselves would give for the rate is useless.
-    assert np.sqrt(np.mean((through.rate(s) - rate) ** 2)) > 3.0
 
 
 @pytest.mark.parametrize("periodic", [None, True])

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import io
-import json
 import sys
 
 import numpy as np
@@ -559,18 +558,11 @@ def test_names_from_a_file(tmp_path):
     (tmp_path / "m.csv").write_text(text(TIMES, DEGREES, GERMAN))
     pairs = TO_GERMAN | {f"{SLIDES} (m)": SLIDES}
     (tmp_path / "names.txt").write_text("# of our lab\n" + "".join(f"{old} = {new}\n" for old, new in pairs.items()))
-    (tmp_path / "names.json").write_text(json.dumps(pairs))
-    for file in ("names.txt", "names.json"):
-        found = read_recorded_motion(tmp_path / "m.csv", BODY, names=tmp_path / file)
-        np.testing.assert_allclose(found.path.shape(TIMES), SHAPES, rtol=0.0, atol=1e-14)
+    found = read_recorded_motion(tmp_path / "m.csv", BODY, names=tmp_path / "names.txt")
+    np.testing.assert_allclose(found.path.shape(TIMES), SHAPES, rtol=0.0, atol=1e-14)
     for file, content, words in (
         ("a.txt", "knee\n", "line 1: COLUMN=JOINT is needed"),
         ("a.txt", "a=b\na=c\n", "line 2: 'a' stands twice"),
-        ("a.json", "{", "no JSON"),
-        ("a.json", "[1]", "one object of texts"),
-        ("a.json", '{"a": 1}', "one object of texts"),
-        ("a.json", '{"a": "b", "a": "c"}', "a column stands twice"),
-        ("a.json", "[" * 100_000, "no JSON"),
         ("b.txt", None, "no such file"),
     ):
         if content is not None:

@@ -549,10 +549,6 @@ def test_poses_of_the_base(case, body, tmp_path):
         np.testing.assert_allclose(turn, [0.0, TURN[-1] - TURN[0], 0.0], rtol=0.0, atol=1e-8)
 
 
-def test_seventy_forms_are_read():
-    assert len(TABLES) + len(POSES) >= 85
-
-
 CELLS = [
     "x",
     "1_0",

@@ -117,12 +117,6 @@ def test_the_path_without_a_wheel_remembers_the_samples_of_its_joints(tmp_path, 
         assert recorded.smoothing.noise.shape == (len(names),)
 
 
-def test_a_geodesic_cannot_close_a_cycle_beside_wheels(tmp_path):
-    file = log(tmp_path, joints())
-    with pytest.raises(TrajectoryError, match="--close-by drift"):
-        sp.read_shape_path(file, SATELLITE, without=["wheel_spin"], close=0.1, close_by="geodesic")
-
-
 def test_errors_name_what_lacks_and_what_to_type(tmp_path):
     lacking = {name: values for name, values in joints(odd=TIMES).items() if name != "arm_3"}
     with pytest.raises(TrajectoryError, match=r"no column for arm_3;") as refused:

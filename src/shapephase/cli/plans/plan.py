@@ -10,23 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 from cyclopts import Parameter
 
 from ...errors import PlanNotFound, ShapeError
-from ..options import (
-    BODY_DEFAULTS,
-    ERROR_DEFAULTS,
-    PRINT_DEFAULTS,
-    RARE,
-    RECORDING_DEFAULTS,
-    START_DEFAULTS,
-    BodyArgument,
-    BodyOptions,
-    ErrorOptions,
-    PrintOptions,
-    RecordingOptions,
-    ReportFile,
-    StartOptions,
-    option,
-    rare,
-)
+from .. import options
+from ..options import option, rare
 from ..outcome import ExitCode, Outcome, check_writable
 from ..progress import steps
 from ..terminal import write_file
@@ -52,11 +37,11 @@ _NO_GOAL, _ALL_JOINTS, _NO_LIMITS, _ONE_SEARCH = GoalOptions(), JointOptions(), 
 
 
 def plan_command(
-    body: BodyArgument,
+    body: options.BodyArgument,
     /,
     *,
     goal: GoalOptions = _NO_GOAL,
-    start: StartOptions = START_DEFAULTS,
+    start: options.StartOptions = options.START_DEFAULTS,
     duration: Annotated[
         float | None,
         option(
@@ -84,11 +69,13 @@ def plan_command(
     out: Annotated[
         Path | None, option("Write the joint motion to this CSV file; for example `--out plan.csv`.")
     ] = None,
-    html: ReportFile = None,
-    recording: Annotated[RecordingOptions, Parameter(name="*", group=RARE)] = RECORDING_DEFAULTS,
-    errors: Annotated[ErrorOptions, Parameter(name="*", group=RARE)] = ERROR_DEFAULTS,
-    floating: BodyOptions = BODY_DEFAULTS,
-    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+    html: options.ReportFile = None,
+    recording: Annotated[
+        options.RecordingOptions, Parameter(name="*", group=options.RARE)
+    ] = options.RECORDING_DEFAULTS,
+    errors: Annotated[options.ErrorOptions, Parameter(name="*", group=options.RARE)] = options.ERROR_DEFAULTS,
+    floating: options.BodyOptions = options.BODY_DEFAULTS,
+    printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find the cheapest motion of the joints that turns a body to a goal, and compute the resulting motion.
 

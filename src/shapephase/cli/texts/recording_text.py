@@ -372,10 +372,9 @@ def _closing_lines(closing: Closing) -> list[str]:
     joint = int(np.argmax(np.abs(closing.gap)))
     names = closing.body.joint_names
     change = float(np.degrees(np.linalg.norm(closing.holonomy_change)))
-    way = {"smooth": "by a periodic smoother", "drift": "by the drift", "geodesic": "by a geodesic"}[closing.by]
-    added = f", which takes {closing.seconds_added:.4g} s" if closing.seconds_added else ""
+    way = {"smooth": "by a periodic smoother", "drift": "by the drift"}[closing.by]
     return [
-        f"{'closed':24}{way}{added}; {names[joint]} ended {_value(closing.body, names[joint], closing.gap[joint])} off",
+        f"{'closed':24}{way}; {names[joint]} ended {_value(closing.body, names[joint], closing.gap[joint])} off",
         f"{'change of the holonomy':24}{change:.4g} deg",
     ]
 

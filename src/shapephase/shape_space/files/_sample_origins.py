@@ -13,7 +13,6 @@ from ...display import frozen
 from ..curves import PiecewisePolynomial
 from ..linear_smoother import LinearSmoother
 from ..path_samples import PathSamples, path_samples
-from ..shape_geodesic import ClosingArc
 from ..shape_path import ShapePath, interpolated
 
 
@@ -176,7 +175,4 @@ def resampled(path: ShapePath, times: Array) -> ShapePath:
     plain = ShapePath.spline(times, path.shape(times), joint_names=path.joint_names)
     curve = plain.curve
     assert isinstance(curve, PiecewisePolynomial)
-    if isinstance(path.origin, ClosingArc):
-        # Its times follow from its samples, too.
-        return replace(plain, curve=replace(curve, through=None))
     return replace(plain, origin=Resampled(path, times, len(times) - (curve.through == "periodic")))

@@ -1,4 +1,4 @@
-"""Loops made of recorded cycles whose ends nearly meet: by a periodic smoother, the drift, or a geodesic."""
+"""Loops made of recorded cycles whose ends nearly meet: by a periodic smoother, or the drift."""
 
 from __future__ import annotations
 
@@ -15,12 +15,11 @@ from ...display import frozen
 from ...errors import TrajectoryError, unknown_name
 from ..connection import horizontal_lift
 from ..curves import CLOSED
-from ..shape_geodesic import ClosingArc, shape_geodesic
 from ..shape_path import ShapePath
 from .labels import amounts
 from .smoothing import Recorded, Smoothing, prepared_path
 
-WAYS = ("smooth", "drift", "geodesic")  # periodic smoother; gap taken off evenly in time; geodesic at the end
+WAYS = ("smooth", "drift")  # periodic smoother; gap taken off evenly in time
 
 
 @frozen
@@ -29,7 +28,7 @@ class Closing:
 
     Attributes
     ----------
-    by : "smooth", "drift" or "geodesic"
+    by : "smooth" or "drift"
     gap : (n,) of the samples, the last from the first, whole turns of endless joints taken off [rad or m]
     opened : the path without closing
     closed : the path with it
@@ -51,11 +50,6 @@ class Closing:
     closed: ShapePath
     body: Body
 
-    @property
-    def seconds_added(self) -> float:
-        """Duration of the geodesic at the end [s]."""
-        return self.closed.duration - self.opened.duration
-
     @cached_property
     def holonomy_change(self) -> Array:
         """Rotation vector from the lift's end along the open path to the holonomy of the loop: (3,), base axes [rad].
@@ -69,7 +63,7 @@ class Closing:
     def record(self) -> dict[str, Any]:
         """Method and gap of the closing, ready for JSON."""
         gap = dict(zip(self.body.joint_names, self.gap.tolist(), strict=True))
-        return {"by": self.by, "gap": gap, "seconds_added": self.seconds_added}
+        return {"by": self.by, "gap": gap}
 
 
 def closed_path(
@@ -90,20 +84,14 @@ def closed_path(
     turns = np.where(body.continuous, 2.0 * np.pi * np.round((last - first) / (2.0 * np.pi)), 0.0)
     gap = last - first - turns
     _check_gap(gap, amounts(within, "close"), body)
-    opened, smoothing = prepared_path(recorded, periodic=False, penalty=penalty)
-    if way == "geodesic":
-        arc = ClosingArc(body, opened, shape_geodesic(body, opened.shape(opened.duration), opened.shape(0.0) + turns))
-        # A gap of rounding takes no time.
-        still = np.abs(gap).max(initial=0.0) <= CLOSED or arc.speed == 0.0
-        closed = opened if still else arc.closed
-    else:
-        silent = np.flatnonzero((recorded.noise == 0.0) & (np.abs(gap) > CLOSED))
-        if way == "smooth" and recorded.cut_off is None and len(silent):
-            raise TrajectoryError(
-                f"joint {body.joint_names[silent[0]]} does not close, and no noise is given that a smoother could use; "
-                "give smooth (--smooth), or close it by drift or geodesic (close_by, --close-by)"
-            )
-        closed, smoothing = prepared_path(recorded, periodic=True, penalty=penalty, turns=turns, drift=way == "drift")
+    opened, _ = prepared_path(recorded, periodic=False, penalty=penalty)
+    silent = np.flatnonzero((recorded.noise == 0.0) & (np.abs(gap) > CLOSED))
+    if way == "smooth" and recorded.cut_off is None and len(silent):
+        raise TrajectoryError(
+            f"joint {body.joint_names[silent[0]]} does not close, and no noise is given that a smoother could use; "
+            "give smooth (--smooth), or close it by drift (close_by, --close-by)"
+        )
+    closed, smoothing = prepared_path(recorded, periodic=True, penalty=penalty, turns=turns, drift=way == "drift")
     return closed, smoothing, Closing(by=way, gap=gap, opened=opened, closed=closed, body=body)
 
 

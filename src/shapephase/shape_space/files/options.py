@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -177,8 +176,8 @@ def _left_out(names: object, body: Body) -> tuple[str, ...]:
 def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:
     """Read a mapping from columns to joints, for the argument `names` of `read_recorded_motion`.
 
-    A file that ends with `.json` holds one object, `{"column": "joint", "other": null}`. Any other is a text with a
-    line `column=joint` for each, where nothing behind the equals sign leaves the column out, and `#` begins a comment.
+    The file is a text with a line `column=joint` for each, where nothing behind the equals sign leaves the column out,
+    and `#` begins a comment.
 
     Raises
     ------
@@ -199,8 +198,6 @@ def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:
     data = file_bytes(where)
     check_text(data, where)
     text = data.decode("utf-8-sig")
-    if where.suffix.lower() == ".json":
-        return _from_json(text, where)
     names: dict[str, str | None] = {}
     for count, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or line.strip().startswith("#"):
@@ -254,17 +251,3 @@ def names_by_label(names: Mapping[str, str | None], labels: Iterable[str]) -> di
             raise TrajectoryError(f"names: {column!r} may be {' or '.join(map(repr, candidates))}; write it in full")
         by_label[candidates[0]] = name
     return by_label
-
-
-def _from_json(text: str, where: Path) -> dict[str, str | None]:
-    try:
-        pairs = json.loads(text, object_pairs_hook=tuple)
-    except (ValueError, RecursionError) as error:
-        raise ShapeError(f"{where}: no JSON ({error!s:.100})") from None
-    # Only an object becomes a tuple, of pairs.
-    if not isinstance(pairs, tuple) or not all(name is None or isinstance(name, str) for _, name in pairs):
-        raise ShapeError(f'{where}: one object of texts, {{"column": "joint", "other": null}}, is needed')
-    names = dict(pairs)
-    if len(names) < len(pairs):
-        raise ShapeError(f"{where}: a column stands twice")
-    return names

@@ -160,8 +160,7 @@ def read_recorded_motion(file: Any, body: Body | str, **options: Unpack[ReadingO
         "3deg,5mm"; None: ends that meet to 1e-9 are joined smoothly, others stay apart; False: they are not joined even
         then
     close_by : "smooth", a smoother that runs on from the end to the start (where `smooth` is given, else "drift");
-        "drift", the gap is taken off evenly in time; "geodesic", the shortest way back in the metric of the kinetic
-        energy is put at the end
+        "drift", the gap is taken off evenly in time
     base_order : of roll, pitch and yaw, or tilt, list and rotation: the axes in the order in which these turn, each
         as the turns before have left it; None: "zyx" (URDF) and "zxy" (OpenSim)
     base_axes : the axes of the base in those whose attitude was recorded: a rotation (3, 3), base axes to those, or a
@@ -245,11 +244,6 @@ def read_recorded_motion(file: Any, body: Body | str, **options: Unpack[ReadingO
         wheel_speeds = _speed_paths(replace(samples, shapes=whole.speeds), motion, option("smooth"))
         closing = None
         if how.close is not None:
-            if joints.without and option("close_by") == "geodesic":
-                raise TrajectoryError(
-                    "a geodesic takes time in which the wheels that are left out do something unknown: give "
-                    "close_by='drift' (--close-by drift)"
-                )
             path, smoothing, closing = closed_path(
                 samples, body, within=how.close, by=option("close_by"), penalty=option("smooth_penalty")
             )

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...arrays import Array, Integers, Mask, check_finite
+from ...arrays import Array, Mask, check_finite
 from ...errors import TrajectoryError
-from ...integrator.resolved import ResolvedPath, joined
+from ...integrator.resolved import ResolvedPath
 from ..curves import Curve
-
-if TYPE_CHECKING:
-    from ..shape_path import ShapePath
 
 # Times (N,), columns (N, 2 n) -> weights (2 n,) [rad per unit of a column], sizes (2 n,) [unit of a column].
 Judge = Callable[[Array, Array], tuple[Array, Array]]
@@ -172,62 +168,6 @@ class FunctionScan:
         """Numbers of panels, evaluations and breaks."""
         breaks = f", {len(self.found_breaks)} breaks found" if len(self.found_breaks) else ""
         return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{breaks}"
-
-    def reversed(self) -> FunctionScan:
-        """Scan of the path backwards in time."""
-        breaks = (self.duration - self.found_breaks)[::-1]
-        return replace(self, resolved=self.resolved.reversed(), found_breaks=breaks)
-
-    def stretched(self, factor: float) -> FunctionScan:
-        """Scan of the path `factor` times as slowly."""
-        return replace(self, resolved=self.resolved.stretched(factor), found_breaks=factor * self.found_breaks)
-
-    def reordered(self, order: Integers) -> FunctionScan:
-        """Scan of the path with its joints in another order."""
-        return replace(self, resolved=self.resolved.reordered(order))
-
-
-@dataclass(frozen=True, eq=False)
-class DerivedScan:
-    """The scan of a path, changed by one of the methods of `FunctionScan`, or left as it is; found when it is needed.
-
-    path : the one that was scanned, or will be
-    change : the name of the method; None: nothing changes
-    arguments : of the method
-    """
-
-    path: ShapePath
-    change: str | None = None
-    arguments: tuple[Any, ...] = ()
-
-    def __call__(self) -> FunctionScan:
-        """Find it."""
-        scan = self.path._scan
-        return scan if self.change is None else getattr(scan, self.change)(*self.arguments)
-
-
-@dataclass(frozen=True, eq=False)
-class JoinedScan:
-    """The scan of paths one after another, each with all its loops; found when it is needed."""
-
-    paths: Sequence[ShapePath]
-
-    def __call__(self) -> FunctionScan:
-        """Find it."""
-        scans = [path._scan for path in self.paths]
-        whole = [joined([scan.resolved] * path.loops) for scan, path in zip(scans, self.paths, strict=True)]
-        found: list[Array] = []
-        start = 0.0
-        for scan, path in zip(scans, self.paths, strict=True):
-            found += [start + scan.duration * loop + scan.found_breaks for loop in range(path.loops)]
-            start += path.duration
-        return FunctionScan(
-            resolved=joined(whole),
-            found_breaks=np.concatenate(found),
-            evaluations=sum(scan.evaluations for scan in scans),
-            calls=sum(scan.calls for scan in scans),
-            noise=max(scan.noise for scan in scans),
-        )
 
 
 def check_rates(curve: Curve, breaks: Array) -> None:
