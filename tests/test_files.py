@@ -311,6 +311,24 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path):
     assert list(tmp_path.iterdir()) == [target]
 
 
+def test_a_disk_that_may_only_be_read_is_refused_also_to_root(tmp_path: Path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounting = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)]
+    if os.geteuid() or subprocess.run(mounting, capture_output=True).returncode:
+        pytest.skip("nothing may be mounted here")
+    try:
+        (disk / "kept").write_text("old")
+        subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
+        for name in ("kept", "new"):
+            with pytest.raises(OutputFileError, match=name):
+                write_whole(disk / name, content("x"))
+        assert (disk / "kept").read_text() == "old"
+        assert [*disk.iterdir()] == [disk / "kept"]
+    finally:
+        subprocess.run(["umount", "--lazy", str(disk)], check=True)
+
+
 def test_sizes_for_people(tmp_path: Path):
     file = tmp_path / "file"
     for size, text in (

@@ -25,7 +25,7 @@ from support.public_calls import as_bytes, calls, digest, digests, digests_of_mo
 # their own tests call them.
 NOT_CALLED = {
     "closed_orbits", "compile_steps", "continued_orbits", "derivatives", "design", "dynamic_phase_from_energy",
-    "in_gauge", "holonomy_derivative", "load_motion", "momentum_crossings", "momentum_from_recording",
+    "in_gauge", "holonomy_derivative", "load_motion", "momentum_from_recording",
     "momentum_returns",
     "export_motion", "motion_from_recording", "particles", "plan_reorientation", "prescribed",
     "read_recorded_motion", "read_shape_path", "read_trajectory", "rigid",

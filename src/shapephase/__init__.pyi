@@ -69,7 +69,7 @@ from .phases.phases import (
     running_phases,
     split,
 )
-from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
+from .phases.recurrence import Returns, momentum_returns
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .phases.whole_turns import TurnCounts, turn_counts
 from .plots.pages.viewer import view
@@ -118,7 +118,6 @@ __all__ = [
     "BodySummary",
     "CompiledCodeWarning",
     "Contributions",
-    "Crossings",
     "Deformation",
     "DeformationFamily",
     "Derivatives",
@@ -211,7 +210,6 @@ __all__ = [
     "mean_body_gauge",
     "mechanical_connection",
     "minimum_perturbation",
-    "momentum_crossings",
     "momentum_from_rate",
     "momentum_from_recording",
     "momentum_returns",

@@ -17,9 +17,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase import so3
 from shapephase.deformation import assembly, boom, moving_mass, rigid_part
-from shapephase.deformation._physical_validity import line_measure
-from shapephase.errors import SingularInertiaError
-from shapephase.inertia_tensor import principal_axes, second_moment, triangle_defect
+from shapephase.inertia_tensor import principal_axes
 from shapephase.rigid_body import EulerTop
 from support.bodies import random_loop
 from support.independent import apart, cross, hat
@@ -143,78 +141,6 @@ def turning(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_positions_count_from_the_centre_of_mass_a1(seed):
-    """Sum of m r = 0 for particles, and for an extended body: the integral of r dm of a boom and a hull."""
-    cloud = Cloud(seed)
-    at, speed = cloud.deformation.description.centred(TIMES)
-    size = np.abs(at).max()
-    np.testing.assert_allclose(np.einsum("m,nmi->ni", cloud.masses, at), np.zeros((5, 3)), rtol=0, atol=1e-14 * size)
-    np.testing.assert_allclose(np.einsum("m,nmi->ni", cloud.masses, speed), np.zeros((5, 3)), rtol=0, atol=1e-13 * size)
-    made = assembly_case(seed)
-    centre = made.centre_of_mass(TIMES)
-    parts = made.description.parts
-    about = [sum(part.moments(np.array([t]), c).first[0] for part in parts) for t, c in zip(TIMES, centre, strict=True)]
-    np.testing.assert_allclose(about, np.zeros((5, 3)), rtol=0, atol=1e-13)
-
-
-def test_the_action_is_free_where_the_second_moment_has_rank_two_a2():
-    """On a line some turn moves nothing and the body is refused; on a plane none does and it is taken."""
-    rng = np.random.default_rng(3)
-    for rank in (1, 2, 3):
-        frame = Rotation.random(rng=rng).as_matrix()
-        points = rng.normal(size=(6, rank)) @ frame[:rank]
-        masses = rng.uniform(0.5, 2.0, 6)
-        points = points - masses @ points / masses.sum()
-        moment = np.einsum("m,mi,mj->ij", masses, points, points)
-        assert np.linalg.matrix_rank(moment, tol=1e-12) == rank
-        turned = points @ expm(0.8 * hat(frame[0])).T
-        assert (np.abs(turned - points).max() < 1e-14) == (rank == 1)
-        assert (line_measure(moment[None])[0] < 1e-14) == (rank == 1)
-        body = sp.particles(masses, lambda t, p=points: (np.broadcast_to(p, (len(t), 6, 3)),) * 2, 1.0)
-        if rank == 1:
-            with pytest.raises(SingularInertiaError, match="mass"):
-                body.inertia([0.4])
-        else:
-            assert np.linalg.eigvalsh(body.inertia(0.4))[0] > 0.1
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_locked_inertia_is_a_sum_of_products_a3(seed):
-    """v.I w = sum m (v x r).(w x r), and I(R d) = R I R^T."""
-    cloud = Cloud(seed)
-    deformation = cloud.deformation
-    v, w = np.random.default_rng(seed).normal(size=(2, 3))
-    at, _ = cloud.centred(TIMES)
-    want = np.einsum("m,nmi,nmi->n", cloud.masses, np.cross(v, at), np.cross(w, at))
-    np.testing.assert_allclose(deformation.inertia(TIMES) @ w @ v, want, rtol=0, atol=1e-13 * np.abs(at).max() ** 2)
-    turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
-    turned = sp.particles(cloud.masses, lambda t: tuple(part @ turn.T for part in cloud(t)), DURATION)
-    np.testing.assert_allclose(turned.inertia(TIMES), turn @ deformation.inertia(TIMES) @ turn.T, rtol=0, atol=1e-13)
-
-
-def test_the_second_moment_is_positive_where_the_triangle_inequality_holds_a4():
-    """J = tr(I)/2 - I: its eigenvalues are half of one moment's lack against the other two."""
-    rng = np.random.default_rng(6)
-    frames = Rotation.random(500, rng=rng).as_matrix()
-    moments = np.sort(rng.uniform(0.2, 3.0, (500, 3)))
-    tensors = frames @ (moments[:, :, None] * np.eye(3)) @ np.swapaxes(frames, 1, 2)
-    least = np.linalg.eigvalsh(second_moment(tensors))[:, 0]
-    lack = moments[:, 2] - moments[:, 1] - moments[:, 0]
-    # Two products of 3 x 3 matrices, the trace and the eigenvalue routine each commit some units of rounding of the
-    # largest entries, which add up to less than the trace; sixteen of them are allowed.
-    rounding = 16.0 * np.finfo(float).eps * moments.sum(axis=1)
-    assert np.all(np.abs(least + 0.5 * lack) <= rounding)
-    assert np.all(np.abs(triangle_defect(tensors) * moments[:, 2] - lack) <= rounding)
-    assert 50 < np.sum(lack > 0) < 450
-    for seed in range(5):
-        cloud = Cloud(seed)
-        at, _ = cloud.centred(TIMES)
-        want = np.einsum("m,nmi,nmj->nij", cloud.masses, at, at)
-        np.testing.assert_allclose(second_moment(cloud.deformation.inertia(TIMES)), want, rtol=0, atol=1e-13)
-        assert cloud.deformation.triangle_defect()[0] < 0.0
-
-
-@pytest.mark.parametrize("seed", range(5))
 def test_equation_3_angular_momentum_of_a_turned_body_a5(seed):
     """L(d/dt (R d)) = R I omega + R L_o for any turn R(t): sums over the particles in space."""
     cloud = Cloud(seed)
@@ -248,11 +174,7 @@ def test_equation_4_kinetic_energy_of_a_turned_body_a6(seed):
 
 
 def test_kinetic_energy_as_printed_lacks_the_half_c_e1():
-    """With T = sum m v^2, printed before equation (4), (4) is off by all of T if the shape rests.
-
-    T = omega.I omega/2 is then the energy of a rigid body, computed from its principal moments. If the shape moves, (4)
-    is off by T - T_0; with the half it holds.
-    """
+    """With T = sum m v^2, printed before equation (4), (4) is off by T - T_0; with the half it holds."""
     cloud = Cloud(1)
     body = cloud.deformation
     turn, omega = turning(1)(TIMES)
@@ -264,67 +186,15 @@ def test_kinetic_energy_as_printed_lacks_the_half_c_e1():
     defect = printed - (turned + of_shape)
     np.testing.assert_allclose(defect, 0.5 * (printed - of_shape), rtol=1e-11)
     assert np.abs(defect).min() > 0.1
-    points = at[0]
-    rigid = sp.particles(
-        cloud.masses, lambda t: (np.broadcast_to(points, (len(t), 5, 3)), np.zeros((len(t), 5, 3))), 2.0
-    )
-    rotating = np.cross(omega[:, None], points) @ np.swapaxes(turn, 1, 2)
-    printed = np.einsum("m,nmi,nmi->n", cloud.masses, rotating, rotating)
-    by_equation_4 = 0.5 * np.sum(omega * times_vector(rigid.inertia(TIMES), omega), axis=-1)
-    moments, axes = np.linalg.eigh(sum(m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(cloud.masses, points)))
-    energy = 0.5 * (omega @ axes) ** 2 @ moments
-    np.testing.assert_allclose(printed - by_equation_4, energy, rtol=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_internal_momentum_is_a_sum_over_the_masses_a7(seed):
-    """L_o = sum m r x r' with the frame at rest, r' by differences of the positions alone."""
-    cloud = Cloud(seed)
-    at, _ = cloud.centred(TIMES)
-    speed = derivative(lambda t: cloud.centred(t)[0], TIMES)
-    want = momentum_of(cloud.masses, at, speed)
-    np.testing.assert_allclose(cloud.deformation.internal_momentum(TIMES), want, rtol=0, atol=1e-9)
-
-
-def test_positions_in_space_are_turn_and_shift_a8():
-    """r = R r_o + T: the centre of mass goes straight, the momentum about it stays, in the frame of the spacecraft."""
-    hull = np.array([[0.9, 0.1, 0.0], [-0.5, 0.8, 0.2], [-0.4, -0.9, 0.4], [0.1, 0.2, -0.8]])
-    weights = np.array([1.0, 1.5, 2.0, 0.5])
-    centre = weights @ hull / weights.sum()
-    arms = hull - centre
-    tensor = sum(m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(weights, arms, strict=True))
-    path = sp.ShapePath.fourier([0.3, 1.0, 0.2], *(0.3 * np.random.default_rng(2).normal(size=(2, 3, 2))), DURATION)
-    made = assembly(rigid_part(5.0, tensor, centre), [moving_mass(1.7, path)])
-    motion = sp.reconstruct(made, MOMENTUM, tolerance=1e-11)
-    start, velocity = np.array([1.0, 2.0, 3.0]), np.array([-0.3, 0.5, 0.1])
-    masses = np.append(weights, 1.7)
-
-    def in_space(t):
-        seen = np.concatenate([np.broadcast_to(hull, (len(t), 4, 3)), path.shape(t)[:, None]], axis=1)
-        return (
-            seen @ np.swapaxes(motion.attitude(t), 1, 2)
-            + motion.base_position(t, start=start, velocity=velocity)[:, None]
-        )
-
-    at, speed = in_space(TIMES), derivative(in_space, TIMES)
-    middle, drift = (np.einsum("m,nmi->ni", masses, part) / masses.sum() for part in (at, speed))
-    np.testing.assert_allclose(middle, start + TIMES[:, None] * velocity, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(drift, np.broadcast_to(velocity, (5, 3)), rtol=0, atol=1e-9)
-    about = momentum_of(masses, at - middle[:, None], speed - drift[:, None])
-    np.testing.assert_allclose(about, np.broadcast_to(MOMENTUM, (5, 3)), rtol=0, atol=1e-8)
-
-
-def driven(strong):
-    """Four masses on springs whose rest lengths change in time: momentum about the centre and energy, at 41 times.
-
-    Weak only: equal and opposite, but with a part across the line between the two.
-    """
+def driven():
+    """Four masses on springs whose rest lengths change in time: momentum about the centre and energy, at 41 times."""
     rng = np.random.default_rng(12)
     masses = rng.uniform(0.5, 1.5, 4)
     at, speed = rng.normal(size=(2, 4, 3))
     rest = rng.uniform(1.0, 2.0, (4, 4))
     rest = rest + rest.T
-    aside = np.array([0.2, -0.5, 0.4])
 
     def forces(t, r):
         total = np.zeros((4, 3))
@@ -333,7 +203,6 @@ def driven(strong):
                 line = r[i] - r[j]
                 distance = np.linalg.norm(line)
                 pull = -(distance - rest[i, j] * (1 + 0.3 * np.sin(2.1 * t + i))) * line / distance
-                pull = pull if strong else pull + np.cross(aside, line)
                 total[i] += pull
                 total[j] -= pull
         return total
@@ -347,25 +216,15 @@ def driven(strong):
     )
     r, v = np.moveaxis(run.y.T.reshape(-1, 2, 4, 3), 1, 0)
     share = masses / masses.sum()
-    r, pace = r - (share @ r)[:, None], share @ v
-    v = v - pace[:, None]
-    return momentum_of(masses, r, v), 0.5 * np.einsum("m,nmi,nmi->n", masses, v, v), pace, masses, r, v, run.t
-
-
-def test_strong_action_and_reaction_keep_the_momentum_and_not_the_energy_a9():
-    """Section 2.2, remarks 2.3 and 2.5; a force that is only equal and opposite keeps the linear momentum alone."""
-    momentum, energy, pace, *_ = driven(strong=True)
-    np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), rtol=0, atol=1e-10)
-    np.testing.assert_allclose(pace, np.broadcast_to(pace[0], pace.shape), rtol=0, atol=1e-10)
-    assert np.ptp(energy) > 0.1 * energy.max()
-    momentum, _, pace, *_ = driven(strong=False)
-    np.testing.assert_allclose(pace, np.broadcast_to(pace[0], pace.shape), rtol=0, atol=1e-10)
-    assert np.abs(momentum - momentum[0]).max() > 0.1 * np.abs(momentum).max()
+    r, v = r - (share @ r)[:, None], v - (share @ v)[:, None]
+    return momentum_of(masses, r, v), 0.5 * np.einsum("m,nmi,nmi->n", masses, v, v), masses, r, v, run.t
 
 
 def test_masses_driven_by_their_own_forces_are_a_self_deforming_body_a9():
     """Their motion seen from some turning frame is a deformation; the library turns it back into that in space."""
-    momentum, energy, _, masses, r, v, times = driven(strong=True)
+    momentum, energy, masses, r, v, times = driven()
+    np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), rtol=0, atol=1e-10)
+    assert np.ptp(energy) > 0.1 * energy.max()
     frame = turning(7)
     turn, omega = frame(times)
     seen = r @ turn
@@ -378,35 +237,6 @@ def test_masses_driven_by_their_own_forces_are_a_self_deforming_body_a9():
     motion = sp.reconstruct(body, momentum[0], turn[0], tolerance=1e-9)
     # Cubics through 41 samples.
     assert apart(motion.attitude(times), turn) < 1e-4
-
-
-def test_a_rigid_body_is_a_shape_that_stays_a10():
-    """Examples 2.6 and 2.7: a constant curve and one inside the fibre move alike, and obey Euler's equations."""
-    cloud = Cloud(8)
-    points = cloud.centred(0.3)[0][0]
-    still = sp.particles(
-        cloud.masses, lambda t: (np.broadcast_to(points, (len(t), 5, 3)), np.zeros((len(t), 5, 3))), 2.0
-    )
-    frame = turning(9)
-
-    def in_fibre(t):
-        u, omega = frame(t)
-        return points @ np.swapaxes(u, 1, 2), np.cross(omega[:, None], points) @ np.swapaxes(u, 1, 2)
-
-    turned = sp.particles(cloud.masses, in_fibre, 2.0)
-    one = sp.reconstruct(still, MOMENTUM, tolerance=1e-11)
-    u, _ = frame(TIMES)
-    start = frame(np.zeros(1))[0][0].T
-    other = sp.reconstruct(turned, MOMENTUM, start, tolerance=1e-11)
-    assert apart(other.attitude(TIMES) @ u, one.attitude(TIMES)) < 1e-10
-    omega = one.angular_velocity(TIMES)
-    tensor = still.inertia(0.0)
-    euler = np.cross(omega @ tensor, omega) - derivative(one.angular_velocity, TIMES) @ tensor
-    np.testing.assert_allclose(euler, np.zeros((5, 3)), rtol=0, atol=1e-8)
-    assert (
-        apart(one.attitude(TIMES), sp.reconstruct(sp.rigid(tensor, 2.0), MOMENTUM, tolerance=1e-11).attitude(TIMES))
-        < 1e-10
-    )
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -437,31 +267,18 @@ def test_equation_5_the_second_order_equation_c1(motion):
     np.testing.assert_allclose(left, right, rtol=0, atol=1e-8 * max(1.0, np.abs(spin).max()) * 3)
 
 
-def test_equation_7_body_momentum_and_its_length_c2(motion):
-    body = motion.deformation
-    spin = times_vector(body.inertia(TIMES), rate_of_attitude(motion, TIMES)) + body.internal_momentum(TIMES)
-    size = np.linalg.norm(motion.momentum)
-    np.testing.assert_allclose(motion.body_momentum(TIMES), spin, rtol=0, atol=1e-8 * size)
-    np.testing.assert_allclose(np.linalg.norm(motion.body_momentum(TIMES), axis=-1), np.full(5, size), rtol=1e-13)
-
-
-def test_equation_8_the_rate_from_the_momentum_c3(motion):
-    body = motion.deformation
-    rest = motion.body_momentum(TIMES) - body.internal_momentum(TIMES)
-    want = np.linalg.solve(body.inertia(TIMES), rest[..., None])[..., 0]
-    np.testing.assert_allclose(rate_of_attitude(motion, TIMES), want, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(motion.angular_velocity(TIMES), want, rtol=0, atol=1e-12 * np.abs(want).max())
-
-
-def test_equation_9_the_momentum_goes_on_its_sphere_c4(motion):
-    body = motion.deformation
-    pi = motion.body_momentum(TIMES)
+def test_equations_7_to_10_momentum_rate_and_attitude_c2_c3_c4_c5(motion):
+    """Pi = I omega + L_o with omega by differences of R, which is I^-1 (Pi - L_o); Pi' = Pi x omega, |Pi| stays."""
+    body, size = motion.deformation, np.linalg.norm(motion.momentum)
+    omega, pi = rate_of_attitude(motion, TIMES), motion.body_momentum(TIMES)
+    spin = times_vector(body.inertia(TIMES), omega) + body.internal_momentum(TIMES)
+    np.testing.assert_allclose(pi, spin, rtol=0, atol=1e-8 * size)
+    np.testing.assert_allclose(np.linalg.norm(pi, axis=-1), np.full(5, size), rtol=1e-13)
     rate = np.linalg.solve(body.inertia(TIMES), (pi - body.internal_momentum(TIMES))[..., None])[..., 0]
+    np.testing.assert_allclose(omega, rate, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(motion.angular_velocity(TIMES), rate, rtol=0, atol=1e-12 * np.abs(rate).max())
     slope = derivative(motion.body_momentum, TIMES)
-    np.testing.assert_allclose(slope, np.cross(pi, rate), rtol=0, atol=1e-8 * np.linalg.norm(motion.momentum))
-    np.testing.assert_allclose(
-        np.sum(slope * pi, axis=-1), np.zeros(5), rtol=0, atol=1e-8 * np.linalg.norm(motion.momentum) ** 2
-    )
+    np.testing.assert_allclose(slope, np.cross(pi, rate), rtol=0, atol=1e-8 * size)
 
 
 def raw_slope(motion):
@@ -473,14 +290,6 @@ def raw_slope(motion):
         return np.linalg.solve(inertia, pi - inner)
 
     return rates
-
-
-def test_equation_10_reconstruction_c5(motion):
-    """R' = R hat(I^-1 (Pi - L_o)), by differences of R."""
-    rates = raw_slope(motion)
-    slope = derivative(motion.attitude, TIMES)
-    want = [motion.attitude(t) @ hat(rates(t, motion.body_momentum(t))) for t in TIMES]
-    np.testing.assert_allclose(slope, want, rtol=0, atol=1e-8)
 
 
 def product_of_turns(motion, count, right):
@@ -510,15 +319,8 @@ def test_the_ordered_exponential_is_ordered_to_the_right_and_ends_at_t_c_e2():
 
 
 def test_the_vector_field_on_the_level_set_of_the_momentum_c6(motion):
-    """Proposition 3.2: X is tangent to R Pi = L at every (R, Pi, t), and its integral curve is (R(t), Pi(t))."""
+    """Proposition 3.2: the integral curve of X is (R(t), Pi(t))."""
     rates = raw_slope(motion)
-    rng = np.random.default_rng(1)
-    for t in TIMES:
-        attitude, pi = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
-        omega = rates(t, pi)
-        np.testing.assert_allclose(
-            attitude @ hat(omega) @ pi + attitude @ np.cross(pi, omega), np.zeros(3), rtol=0, atol=1e-13
-        )
 
     def field(t, y):
         attitude, pi = y[:9].reshape(3, 3), y[9:]

@@ -97,37 +97,6 @@ def test_kinetic_energy_needs_the_masses_e2():
         kinetic_energy_along(sp.reconstruct(deformation, momentum), 0.1)
 
 
-def test_printed_kinetic_energy_is_off_by_the_whole_of_it_c_e1(swarm):
-    """T is printed as the sum of m |v|^2 over the particles in space: what equation (4) gives falls short by all of T.
-
-    The velocities in space are differences of positions; T is the right side of (4), with the inertia, the internal
-    momentum and T_0 as sums over the particles.
-    """
-    times, description = inner_times(swarm), swarm.deformation.description
-    share = description.masses / description.masses.sum()
-
-    def centred(t):
-        points, speeds = (np.asarray(part) for part in description.positions(t))
-        return points - (share @ points)[:, None], speeds - (share @ speeds)[:, None]
-
-    def in_space(t):
-        return centred(t)[0] @ np.swapaxes(swarm.attitude(t), -1, -2)
-
-    velocities = differentiated(in_space, times, 2e-3 * swarm.duration)
-    printed = np.einsum("m,nmi,nmi->n", description.masses, velocities, velocities)
-    points, speeds = centred(times)
-    omega = swarm.angular_velocity(times)
-    turning = np.cross(omega[:, None], points)
-    by_equation_4 = (
-        0.5 * np.einsum("m,nmi,nmi->n", description.masses, turning, turning)
-        + np.einsum("ni,m,nmi->n", omega, description.masses, np.cross(points, speeds))
-        + 0.5 * np.einsum("m,nmi,nmi->n", description.masses, speeds, speeds)
-    )
-    assert printed - by_equation_4 == pytest.approx(by_equation_4, rel=1e-9)
-    assert printed - kinetic_energy_along(swarm, times) == pytest.approx(by_equation_4, rel=1e-9)
-    assert by_equation_4.min() > 0.0
-
-
 @pytest.mark.parametrize("seed", range(len(KINDS)))
 def test_energy_rate_is_the_derivative_of_the_energy_e3(seed):
     """Along a motion, for every kind of deformation, with and without internal momentum."""

@@ -214,30 +214,6 @@ def test_a_boom_and_a_cart_are_links_on_slides(load_urdf):
         )
 
 
-def test_a_boom_that_is_out_is_a_rod_on_a_slide(load_urdf):
-    """At each length a rod link of that length and the rest of the mass at the root, and the rod's speed along it."""
-    path = extension(0.5, 3.0)
-    made = assembly(HULL_PART, [boom(8.0, 4.0, ROOT, AXIS, path)])
-    for t in (0.0, 0.4, 0.8, 1.6):
-        length, pace = float(path.shape(t)[0]), float(path.rate(t)[0])
-        mass = 2.0 * length
-        rod_inertia = mass * length**2 / 12.0 * (np.eye(3) - np.outer(AXIS, AXIS))
-        body = load_urdf(
-            urdf(
-                link("hull", 50.0, HULL, [0.1, 0.2, -0.1]),
-                link("drum", 8.0 - mass, np.zeros((3, 3)), ROOT),
-                link("rod", mass, rod_inertia, ROOT + 0.5 * length * AXIS),
-                joint("bolt", "fixed", "hull", "drum"),
-                joint("rail", "prismatic", "hull", "rod", AXIS),
-            )
-        )
-        np.testing.assert_allclose(made.inertia(t), body.locked_inertia([0.0]), rtol=0, atol=1e-12 * 50)
-        np.testing.assert_allclose(
-            made.internal_momentum(t), body.internal_momentum([0.0], [pace]), rtol=0, atol=1e-12 * 50
-        )
-        np.testing.assert_allclose(made.centre_of_mass(t), body.centre_of_mass([0.0]), rtol=0, atol=1e-13)
-
-
 def test_a_boom_through_the_centre_makes_no_internal_momentum():
     """F4b: along an axis through the common centre two moments grow, by the rod's closed form, the third stays."""
     path = extension(0.0, 4.0)

@@ -142,8 +142,8 @@ def wobble(t):
     return POINTS + 0.2 * np.sin(phase), 0.2 * 2 * np.pi / 3.0 * np.cos(phase)
 
 
-def test_particles_are_sums_over_the_masses(rng):
-    """A1, A3, A7, A8: I and L_o about the common centre, wherever the frame's origin lies and moves."""
+def test_particles_are_sums_over_the_masses_a1_a3_a7_a8(rng):
+    """I and L_o about the common centre, wherever the frame's origin lies and moves."""
     deformation = sp.particles(MASSES, wobble, 3.0)
     drift = np.array([2.0, -1.0, 0.5])
     drifting = sp.particles(
@@ -619,8 +619,8 @@ def test_a_rigid_body():
         sp.rigid(tensor + np.triu(np.ones((3, 3)), 1), 1.0)
 
 
-def test_a_rigid_body_described_from_a_turning_frame():
-    """A10, Cabrera example 2.7: d_0(t) = U(t) d in the fibre moves as the rigid body: R U is Euler's motion."""
+def test_a_rigid_body_described_from_a_turning_frame_a10():
+    """Cabrera example 2.7: d_0(t) = U(t) d in the fibre moves as the rigid body: R U is Euler's motion."""
     spin = np.array([0.7, -0.4, 0.9])
     centred = POINTS - MASSES @ POINTS / MASSES.sum()
     inertia = inertia_of(MASSES, centred)

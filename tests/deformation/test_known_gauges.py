@@ -236,24 +236,6 @@ def test_a_link_stands_still_in_its_own_frame(linked):
         )
 
 
-def test_how_a_link_turns_against_differences(linked):
-    """A second way to the same: the poses of the link, differentiated."""
-    case, name = linked
-    path, body = case.path, case.body
-
-    def frame(t):
-        return transposed(body.link_pose(path.shape(t), name)[:, :3, :3])
-
-    omega = rates_of(frame, INNER)
-    turning = body.link_angular_velocity(path.shape(INNER), path.rate(INNER), name)
-    np.testing.assert_allclose(turning, -omega, atol=1e-11 * max(1.0, np.abs(omega).max()), rtol=0)
-    there, loop = link_gauge(case.deformation, name), case.deformation
-    close(there.frame(INNER), frame(INNER), 1e-15)
-    want = applied(frame(INNER), applied(loop.inertia(INNER), omega) + loop.internal_momentum(INNER))
-    np.testing.assert_allclose(there.internal_momentum(INNER), want, atol=1e-10 * np.abs(want).max(), rtol=0)
-    close(there.inertia_rate(INNER), slope_of(there.inertia, INNER), 1e-10)
-
-
 def test_the_base_link_is_the_base(case):
     """The root link's frame is the one that the joint path is described in."""
     loop = case.deformation
@@ -454,37 +436,6 @@ def test_rates_of_the_mean_frame_against_differences(name):
     np.testing.assert_allclose(there.internal_momentum(INNER), want, atol=1e-10 * size, rtol=0)
     close(there.inertia(INNER), frame @ loop.inertia(INNER) @ transposed(frame), 1e-14)
     close(there.inertia_rate(INNER), slope_of(there.inertia, INNER), 1e-10)
-
-
-@pytest.mark.parametrize("name", [*CASES, "particles"])
-def test_no_momentum_at_the_reference_and_little_near_it(name):
-    """L_o = sum m (U r - r_ref) x v there: nothing at the reference, and no slope in time, as v x v = 0."""
-    loop, reference = everything()[name], 1.3
-    there = mean_body_gauge(loop, reference)
-    size = np.linalg.norm(loop.internal_momentum(reference))
-    assert np.linalg.norm(there.internal_momentum(reference)) < 1e-13 * size
-    near = [np.linalg.norm(there.internal_momentum(reference + h)) for h in (4e-3, 2e-3, 1e-3)]
-    assert near[0] < 1e-3 * size
-    np.testing.assert_allclose(np.divide(near[:-1], near[1:]), 4.0, atol=0.1, rtol=0)
-
-
-def test_small_motions_carry_momentum_of_second_order_in_the_mean_frame(case):
-    """Swings e times as large about the reference: L_o as e in the base, as e^2 in the mean frame."""
-    body, whole = case.body, case.path
-
-    def momenta(e):
-        def path(t):
-            return whole.shape(0.0) + e * (whole.shape(t) - whole.shape(0.0)), e * whole.rate(t)
-
-        loop = sp.articulated(body, sp.ShapePath.function(path, LENGTH, joint_names=body.joint_names))
-        seen = loop, mean_body_gauge(loop)
-        return np.array([np.linalg.norm(d.internal_momentum(INNER)) for d in seen])
-
-    large, small = momenta(2e-3), momenta(1e-3)
-    base, mean = large / small
-    assert base == pytest.approx(2.0, abs=0.02)
-    assert mean == pytest.approx(4.0, abs=0.1)
-    assert small[1] < 0.02 * small[0]
 
 
 def test_the_mean_frame_depends_on_the_shape_alone(case):
@@ -716,35 +667,6 @@ def test_the_energy_is_the_same_from_every_frame(name):
     for kind, seen in frames_of(loop).items():
         here = applied(seen.frame(INNER), omegas - rates_of(seen.frame, INNER))
         np.testing.assert_allclose(seen.kinetic_energy(INNER, here), want, rtol=1e-10, err_msg=kind)
-
-
-def test_the_work_of_one_joint_is_its_torque():
-    """dT/dt along a free motion is torque times rate, the torque from Pinocchio's inverse dynamics (floating base)."""
-    case = case_of("contraption")
-    motion = sp.reconstruct(case.deformation, random_vector(2, 1.0), tolerance=1e-12)
-    data = case.model.createData()
-    step = 5e-3
-
-    def full(t):
-        q, v = case.state(t)
-        q[3:7] = Rotation.from_matrix(motion.attitude(t)).as_quat()
-        omega = motion.angular_velocity(t)
-        v[3:6] = omega
-        pin.ccrba(case.model, data, q, v)
-        v[:3] = -data.hg.linear @ motion.attitude(t) / pin.computeTotalMass(case.model)  # the centre of mass at rest
-        return q, v
-
-    power = []
-    for t in INNER:
-        q, v = full(t)
-        rate = slope_of(lambda s: full(s)[1], t, step)
-        # Only the gravity-free forces on the joints do work: those on the free-flyer vanish.
-        case.model.gravity = pin.Motion.Zero()
-        force = pin.rnea(case.model, data, q, v, rate)
-        np.testing.assert_allclose(force[:6], 0.0, atol=1e-9 * np.abs(force).max(), rtol=0)
-        power.append(force @ v)
-    energy = lambda t: case.deformation.kinetic_energy(t, motion.angular_velocity(t))  # noqa: E731
-    np.testing.assert_allclose(slope_of(energy, INNER, step), power, atol=1e-9 * np.abs(power).max(), rtol=0)
 
 
 def test_leading_axes_of_the_new_functions(rng):

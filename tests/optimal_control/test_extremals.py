@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import shapephase as sp
@@ -21,7 +20,6 @@ from shapephase.optimal_control import conjugate_times, extremal, jacobi_fields,
 from shapephase.optimal_control.extremals import hamiltonian as hamiltonian_module
 from shapephase.optimal_control.extremals import wong_residual as wong_residual_module
 from support.bodies import joint, link, random_loop, urdf
-from support.independent import cross
 from support.long_runs import full_but
 
 X = np.array([1.0, 0.0, 0.0])
@@ -118,32 +116,6 @@ def small_circle(body, angle, axis=X, duration=1.0):
 
 
 @pytest.mark.parametrize("kind", METRICS)
-def test_hamiltons_equations_by_finite_differences(cat, kind):
-    """r' = H_p, p' = -H_r, l' = l x H_l (the minus Lie-Poisson bracket), with H from Pinocchio's numbers alone."""
-    charge = CHARGES[kind]
-
-    def energy(shape, momentum, moment):
-        kinetic = momentum - sp.mechanical_connection(cat, shape).T @ moment
-        return 0.5 * kinetic @ np.linalg.solve(metric_of(cat, shape, kind), kinetic)
-
-    def field(_, state):
-        shape, momentum, moment = state[:3], state[3:6], state[6:]
-        by_shape = slopes(lambda x: energy(x, momentum, moment), shape)
-        # H is quadratic in momenta: differences of any step are exact.
-        by_momentum = slopes(lambda x: energy(shape, x, moment), momentum, 0.1)
-        by_moment = slopes(lambda x: energy(shape, momentum, x), moment, 0.1)
-        return np.concatenate([by_momentum, -by_shape, cross(moment, by_moment)])
-
-    momentum = metric_of(cat, START, kind) @ RATE + sp.mechanical_connection(cat, START).T @ charge
-    truth = solve_ivp(
-        field, (0.0, 0.2), np.concatenate([START, momentum, charge]), method="DOP853", rtol=1e-9, atol=1e-11
-    ).y[:, -1]
-    motion = extremal(cat, START, RATE, charge, 0.2, metric=kind)
-    assert np.abs(motion.shape(0.2) - truth[:3]).max() < 2e-9
-    assert np.abs(motion.attitude(0.2).T @ charge - truth[6:]).max() < 2e-9 * np.linalg.norm(charge)
-
-
-@pytest.mark.parametrize("kind", METRICS)
 @pytest.mark.parametrize("which", ["cat", "planar", "sliding"])
 def test_wongs_equations(which, kind, request, rng):
     """d/dt (g r')_i = 1/2 r' dg/dr_i r' + l F_ik r'_k with F of `curvature`, all else by differences."""
@@ -220,24 +192,6 @@ def test_one_rotor_turns_evenly_whatever_the_charge(rotor):
 # ---- Planar bodies: magnetic geodesics ------------------------------------------------------------------------------
 
 
-def test_planar_extremals_have_the_curvature_of_a_charge_in_a_magnetic_field(planar):
-    """Geodesic curvature of the way = charge x curvature density / speed, by Christoffel symbols from differences."""
-    motion = extremal(planar, [0.6, -0.4], [1.0, 1.3], [0.0, 0.0, 0.2], 1.0)
-    for time in (0.3, 0.7):
-        shape, rate, step = motion.shape(time), motion.rate(time), 2e-3
-        around = [motion.rate(time + k * step) for k in (-2, -1, 1, 2)]
-        change = (around[0] - 8.0 * around[1] + 8.0 * around[2] - around[3]) / (12.0 * step)
-        metric = metric_of(planar, shape)
-        by = slopes(lambda r: metric_of(planar, r), shape)
-        lowered = 0.5 * (np.einsum("ijk->kij", by) + np.einsum("jik->kij", by) - by)
-        acceleration = change + np.einsum("kl,lij,i,j->k", np.linalg.inv(metric), lowered, rate, rate)
-        area, speed = np.sqrt(np.linalg.det(metric)), np.sqrt(rate @ metric @ rate)
-        bending = area * (rate[0] * acceleration[1] - rate[1] * acceleration[0]) / speed**3
-        density = sp.curvature(planar, shape)[0, 1, 2] / area
-        # A charge pushes along +F_ik r'_k: to the right of the motion where F_12 is positive.
-        assert bending == pytest.approx(-0.2 * density / speed, rel=1e-7)
-
-
 def test_a_charge_across_the_plane_is_not_felt(planar):
     bare = extremal(planar, [0.6, -0.4], [1.0, 1.3], [0.0, 0.0, 0.2], 1.0)
     charged = extremal(planar, [0.6, -0.4], [1.0, 1.3], [0.5, -0.7, 0.2], 1.0)
@@ -280,15 +234,6 @@ def test_small_rotations_cost_what_the_isoperimetric_circle_costs(cat, degrees):
     found = conjugate_times(motion)
     assert [one.multiplicity for one in found] == [1]
     assert found[0].time == pytest.approx(1.0, abs=1e-9)
-
-
-def test_conjugate_times_of_a_small_circle_are_those_of_the_heisenberg_group(cat):
-    path, _ = small_circle(cat, np.radians(0.01))
-    motion = shoot(cat, path, so3.exp(np.radians(0.01) * X), tolerance=1e-12)
-    found = conjugate_times(motion, 2.2)
-    second = brentq(lambda x: np.tan(x) - x, 4.0, 4.6, xtol=1e-14) / np.pi
-    assert [one.multiplicity for one in found] == [1, 1, 1]
-    np.testing.assert_allclose([one.time for one in found], [1.0, second, 2.0], atol=1e-8)
 
 
 @pytest.mark.full

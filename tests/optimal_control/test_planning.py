@@ -8,9 +8,7 @@ import signal
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline
-from scipy.optimize import least_squares
 
 import shapephase as sp
 from shapephase import so3
@@ -80,18 +78,6 @@ def rotor(load_urdf):
         link("hub", 1.0, (3.0, 3.5, 4.0)),
         link("wheel", 0.5, (0.3, 0.3, 0.5)),
         joint("spin", "continuous", "hub", "wheel"),
-    )
-    return load_urdf(text)
-
-
-def planar_chain(load_urdf):
-    """Three bars in a plane."""
-    text = urdf(
-        link("middle", 1.0, (0.001, 0.021, 0.02)),
-        link("left", 1.0, (0.001, 0.021, 0.02), com=(-0.25, 0.0, 0.0)),
-        link("right", 1.0, (0.001, 0.021, 0.02), com=(0.25, 0.0, 0.0)),
-        joint("one", "revolute", "middle", "left", xyz=(-0.25, 0.0, 0.0)),
-        joint("two", "revolute", "middle", "right", xyz=(0.25, 0.0, 0.0)),
     )
     return load_urdf(text)
 
@@ -273,41 +259,6 @@ def test_a_rotor_from_rest_to_rest(load_urdf, cost, end):
         assert plan.cost == pytest.approx(0.5 * points @ gram @ points / period ** (2 * order - 1), rel=1e-9)
         costs.append(plan.cost / least)
     assert 1.0 < costs[1] < costs[0] < 2.5
-
-
-@pytest.mark.full
-def test_a_planar_chain_follows_magnetic_geodesics(load_urdf):
-    """In the plane of two joints an optimal loop bends by a constant times the curvature, at constant speed.
-
-    The equation is integrated anew from the loop's start; the constant and the first rates are fitted, and the cost of
-    what comes out is the plan's.
-    """
-    body = planar_chain(load_urdf)
-    period = 1.0
-    turn = so3.exp(np.array([0.0, 0.0, 0.35]))
-    plan = plan_reorientation(body, turn, duration=period, search=Search(pieces=320), **FREE)
-    known = symbolic_body(body)
-    metric, by_shape = known.shape_metric, known.derivative("shape_metric")
-
-    def slope(_, y, charge):
-        r, v = y[:2], y[2:]
-        slopes = by_shape(r).full().reshape(2, 2, 2)
-        force = 0.5 * np.einsum("ijk,i,j->k", slopes, v, v) - np.einsum("kij,i,j->k", slopes, v, v)
-        field = charge * sp.curvature(body, r)[0, 1, 2]
-        return np.concatenate([v, np.linalg.solve(metric(r).full(), force + field * np.array([v[1], -v[0]]))])
-
-    times = np.linspace(0.0, period, 9)
-
-    def gap(unknown):
-        first = [*plan.path.shape(0.0), *unknown[:2]]
-        run = solve_ivp(slope, (0.0, period), first, args=(unknown[2],), rtol=1e-10, atol=1e-12, t_eval=times)
-        return (run.y[:2].T - plan.path.shape(times)).ravel()
-
-    fitted = least_squares(gap, [*plan.path.rate(0.0), 0.0])
-    assert np.abs(fitted.fun).max() < 1e-6
-    start = fitted.x[:2]
-    energy = 0.5 * start @ metric(plan.path.shape(0.0)).full() @ start
-    assert plan.cost == pytest.approx(energy * period, rel=1e-6)
 
 
 @pytest.mark.parametrize(

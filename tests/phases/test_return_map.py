@@ -17,7 +17,8 @@ from scipy.integrate import solve_ivp
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import OpenPathError, ShapeError, TrajectoryError
-from shapephase.phases import FixedPoints, continued_orbits, fixed_points, stroboscopic_map
+from shapephase.phases import FixedPoints, _loop_map, continued_orbits, fixed_points, stroboscopic_map
+from shapephase.sphere import fibonacci_directions
 from support.independent import (
     BODIES,
     apart,
@@ -152,6 +153,22 @@ def test_without_momentum_the_map_is_the_inverse_holonomy():
     assert one.derivative.shape == (2, 2)
     assert isinstance(one.gap, float)
     assert isinstance(one.trace, float)
+
+
+def test_many_directions_are_run_in_parts(monkeypatch: pytest.MonkeyPatch):
+    """Attitudes of both are within 1e-10; how far a direction is off is at most that."""
+    deformation, directions = deformation_of("cat"), fibonacci_directions(50)
+    whole = stroboscopic_map(deformation, BODIES["cat"], directions)
+    points = fixed_points(deformation, BODIES["cat"])
+    monkeypatch.setattr(_loop_map, "_ROWS_AT_ONCE", 20)
+    monkeypatch.setattr(_loop_map, "_SLOPES_AT_ONCE", 40)
+    parts = stroboscopic_map(deformation, BODIES["cat"], directions)
+    assert len(parts.solution.parts) == 3
+    np.testing.assert_allclose(parts.end, whole.end, rtol=0.0, atol=2e-10)
+    np.testing.assert_allclose(parts.derivative, whole.derivative, rtol=0.0, atol=1e-7)
+    again = fixed_points(deformation, BODIES["cat"])
+    assert again.stability == points.stability
+    np.testing.assert_allclose(again.directions, points.directions, rtol=0.0, atol=1e-9)
 
 
 def test_a_map_needs_a_loop_directions_and_a_size():

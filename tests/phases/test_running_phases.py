@@ -28,7 +28,6 @@ from support.independent import (
     apart,
     body_of,
     cross,
-    geodesic_turn,
     hat,
     random_loop,
     random_rotation,
@@ -209,18 +208,6 @@ def test_the_attitude_is_the_dynamic_phase_after_parallel_transport(name):
         assert phases.montgomery_phase[0] == 0.0
 
 
-@pytest.mark.parametrize("gauge", ["base", "horizontal", "given"])
-def test_the_frame_turned_onto_the_reference_turns_by_the_phase(gauge):
-    """R(t) B(u(t)) = exp(theta(t) mu^) R(0) B(u(0)), B the shortest turn from the reference, by Rodrigues."""
-    motion = some_motion("example:human")
-    times = np.linspace(0.0, 2.0, 33)
-    phases = running_phases(motion, times, gauge_of(gauge))
-    axis = unit(motion.momentum)
-    frames = motion.attitude(times) @ np.swapaxes(frames_of(motion, gauge, times), 1, 2)
-    joined = np.array([r @ geodesic_turn(phases.reference, r.T @ axis) for r in frames])
-    assert apart(turns_about(axis, phases.montgomery_phase) @ joined[0], joined) < 1e-10
-
-
 def test_the_reference_is_far_from_the_point_opposite_the_curve():
     for name in ("cat", "example:human"):
         motion = some_motion(name)
@@ -379,59 +366,6 @@ def test_arcs_outside_the_motion():
 # ---- A continuous phase --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(
-    ("name", "closed"),
-    [
-        ("satellite", "base"),
-        pytest.param("satellite", "horizontal", marks=FULL),
-        pytest.param("example:human", "base", marks=FULL),
-        pytest.param("example:human", "horizontal", marks=FULL),
-        pytest.param("cat", "base", marks=FULL),
-        pytest.param("cat", "horizontal", marks=FULL),
-    ],
-)
-def test_twenty_loops_without_a_jump(name, closed):
-    """No step exceeds what the rates allow, and the end is the angle of an independent attitude."""
-    motion = steady_orbit(name, closed)
-    times = np.linspace(0.0, 40.0, 2001)
-    momentum = motion.body_momentum(times)
-    u = momentum / BODIES[name]
-    loop = random_loop(1, body_of(name).n_shape)
-    truth = truth_of(name, loop, motion.momentum, motion.initial_attitude, np.array([0.0, 40.0]), {}, rtol=1e-12)
-    omega = motion.angular_velocity(times)
-    drift = np.linalg.solve(motion.deformation.inertia(times), motion.deformation.internal_momentum(times)[..., None])
-    for gauge, frames, spin in (
-        ("base", np.broadcast_to(np.eye(3), (2001, 3, 3)), 0.0),
-        ("horizontal", frames_of(motion, "horizontal", times), -drift[..., 0]),
-    ):
-        phases = running_phases(motion, times, gauge)
-        assert phases.residual <= phases.error_estimates.montgomery_phase.max()
-        v, seen = np.einsum("nij,nj->ni", frames, u), np.einsum("nij,nj->ni", frames, omega - spin)
-        along = np.sum(v * seen, axis=1)
-        height = v @ phases.reference
-        # The area form is at most this, whichever way the curve goes.
-        swept = np.linalg.norm(np.cross(v, seen), axis=1) * np.sqrt(np.maximum(1.0 - height, 0.0) / (1.0 + height))
-        for values, rates in ((phases.dynamic_phase, np.abs(along)), (phases.solid_angle, swept)):
-            allowed = 0.02 * np.maximum(rates[1:], rates[:-1]) * 1.2 + 1e-4
-            assert np.all(np.abs(np.diff(values)) < allowed)
-        assert height.min() > -0.999
-        differences = (phases.dynamic_phase[2:] - phases.dynamic_phase[:-2]) / 0.04
-        np.testing.assert_allclose(differences, along[1:-1], rtol=0, atol=3e-2 * np.abs(along).max())
-        first = motion.initial_attitude @ geodesic_turn(phases.reference, v[0])
-        last = truth.attitude[-1] @ frames[-1].T @ geodesic_turn(phases.reference, v[-1])
-        assert apart(turn(UP, phases.montgomery_phase[-1]) @ first, last) < 1e-8
-        if gauge == closed == "base":
-            # At the ends of loops it is the phase of the loops so far, and at the end the angle of the attitude.
-            at_loops = phases.montgomery_phase[::100]
-            assert np.abs(at_loops - np.arange(21) * at_loops[1]).max() < 1e-8
-            direct = Rotation.from_matrix(truth.attitude[-1] @ motion.initial_attitude.T).as_rotvec()
-            assert np.linalg.norm(direct[:2]) < 1e-8
-            assert abs(wrapped(phases.montgomery_phase[-1] - direct[2])) < 1e-8
-            split = sp.split(motion, "base")
-            assert whole_spheres(phases.montgomery_phase[-1] - split.montgomery_phase) < 1e-9
-
-
 @pytest.mark.parametrize(
     ("name", "loops"),
     [("satellite", 3), pytest.param("cat", 20, marks=FULL), pytest.param("satellite", 20, marks=FULL)],
@@ -450,21 +384,6 @@ def test_phases_of_momenta_that_do_not_close(name, loops):
         np.testing.assert_allclose(phases.dynamic_phase, truth.dynamic[gauge], rtol=0, atol=1e-9)
         np.testing.assert_allclose(phases.solid_angle, truth.area[gauge], rtol=0, atol=1e-9)
         assert phases.residual < 1e-11
-
-
-@pytest.mark.parametrize("name", ["cat", "example:human"])
-def test_the_rate_of_the_dynamic_phase(name):
-    """theta_D' = omega . Pi/|Pi| (Cabrera 2006, equation 12), by differences of order eight."""
-    motion = some_motion(name)
-    times, h = np.linspace(0.1, 1.9, 37), 2e-3
-    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
-    phases = running_phases(motion, times[:, None] + h * np.arange(-4, 5), "base").dynamic_phase
-    slope = sum(w * (phases[:, 4 + k] - phases[:, 4 - k]) for k, w in weights.items()) / h
-    truth = np.sum(motion.angular_velocity(times) * motion.body_momentum(times), axis=1) / BODIES[name]
-    np.testing.assert_allclose(slope, truth, rtol=0, atol=1e-9 * np.abs(truth).max())
-    np.testing.assert_allclose(
-        running_phases(motion, times, "base").dynamic_phase, motion.dynamic_phase(times), rtol=0, atol=1e-12
-    )
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-6, 1e-3, 0.1])
@@ -693,21 +612,6 @@ def test_frames_of_the_body(name, gauge):
     axis = unit(motion.momentum)
     assert apart(turn(axis, float(split.montgomery_phase)) @ split.closing_tilt, split.total_rotation) < 1e-10
     assert abs(split.dynamic_phase - base.dynamic_phase) > 1e-3
-
-
-def test_another_link_turns_by_its_own_pose():
-    """The attitude of a link in space is that of the base times its pose."""
-    motion, body = some_motion("example:human"), body_of("example:human")
-    times = np.array([0.0, 0.6, 1.1, 2.0])
-    shapes = random_loop(1, body.n_shape).path.shape(times)
-    links = motion.attitude(times) @ body.link_pose(shapes, "right_hand")[:, :3, :3]
-    arcs = arc_phases(motion, times, "link:right_hand")
-    axis = unit(motion.momentum)
-    for k, (first, last) in enumerate(pairwise(links)):
-        assert apart(turn(axis, arcs.montgomery_phase[k]) @ arcs.closing_tilt[k], last @ first.T) < 1e-10
-    rolled = parallel_transport(motion, times, "link:right_hand")
-    phases = running_phases(motion, times, "link:right_hand")
-    assert apart(turns_about(axis, phases.dynamic_phase) @ rolled, links) < 1e-10
 
 
 @pytest.mark.parametrize("name", ["cat", "satellite"])

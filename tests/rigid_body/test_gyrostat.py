@@ -42,10 +42,7 @@ def test_a_hundred_attitudes_are_those_of_50_digits(reference, rows):
     assert np.all(off < PER_CONDITION * reference["condition"])
 
 
-def test_the_committed_values_are_those_of_the_script(reference):
-    inputs = gyrostat_reference.cases()
-    for name, values in zip(("inertia", "rotor", "momentum"), inputs, strict=True):
-        assert_within(values, reference[name], 1e-7)
+def test_the_frozen_attitudes_solve_the_equations(reference):
     some = (reference[name][::4] for name in ("inertia", "rotor", "momentum"))
     rough = gyrostat_reference.plain_attitudes(*some, float(reference["duration"]), steps=300)
     off = np.abs(rough - reference["attitude"][::4]).max(axis=(1, 2))

@@ -153,7 +153,6 @@ def _no_xml() -> Iterator[Case]:
     yield _case("empty", b"", "empty file", line=1)
     yield _case("whitespace", b"  \n\n \t ", "empty file", line=1)
     yield _case("cut in a tag", GOOD[: GOOD.index("izz") - 2], xml, line=6)
-    yield _case("cut between tags", GOOD[: GOOD.index("</link>")], xml, line=7)
     yield _case("json", b'{"robot": {"name": "a"}}', "a JSON file", line=1)
     yield _case("random bytes", random.Random(1).randbytes(500), "a binary file", line=1)
     yield _case("utf-16", GOOD.encode("utf-16"))
@@ -168,11 +167,7 @@ def _no_xml() -> Iterator[Case]:
     yield _case("zero byte at the end", GOOD + "\0")
     yield _case("bell in a comment", edit(("<link", "<!-- \a --><link")), xml, line=3)
     yield _case("two robots", GOOD + GOOD.split("\n", 1)[1], "XML.*junk", line=36)
-    yield _case("text after", GOOD + "the end", "XML.*junk", line=36)
-    yield _case("attribute twice", edit(("<mass ", '<mass value="1" ')), "XML.*duplicate", "<mass")
-    yield _case("unclosed", edit(("</inertial>", "")), "XML.*mismatched", "</link>")
     yield _case("no quotes", edit(('"3.0"', "3.0")), xml, "<mass")
-    yield _case("bare ampersand", edit(("arm", "a&m")), xml, "a&m")
     yield _case("unknown entity", edit(("arm", "a&mass;m")), "XML.*entity", "a&mass;m")
     yield _case("known entity", edit(('"base"', '"b&amp;e"'), ('"base"', '"b&amp;e"')))
     yield _case("quotes in a name", edit(('"base"', "'b\"se'"), ('"base"', "'b\"se'")))
@@ -184,7 +179,6 @@ def _no_xml() -> Iterator[Case]:
     yield _case("entity from outside", outside, "DOCTYPE", line=1)
     yield _case("parameter entity", '<!DOCTYPE r [<!ENTITY % p SYSTEM "http://a/b"> %p;]><robot/>', "DOCTYPE", line=1)
     yield _case("doctype alone", "\n<!DOCTYPE robot>" + GOOD.split("\n", 1)[1], "DOCTYPE", line=2)
-    yield _case("unbound prefix", edit(("<link", "<a:link")), xml, line=8)
     yield _case("processing instruction", edit(("<robot", '<?xml-stylesheet href="/dev/zero"?><robot')))
     yield _case("character data", edit(("<link", "<![CDATA[ <mass value='9'/> ]]><link")))
     yield _case("commented link", edit(("<link", "<!-- <link name='x'/> --><link")))
@@ -563,7 +557,6 @@ def _mjcfs() -> Iterator[Case]:
     yield mjcf("cut", GOOD_MJCF[:400], "XML", line=14)
     for name, file, said in (
         ("include", "/etc/passwd", "XML parse error"),
-        ("include of itself", "mjcf_include_of_itself.xml", "already included"),
         ("include of nothing", "nowhere.xml", "Error opening file"),
     ):
         yield refused(name, "<worldbody>", f'<worldbody><include file="{file}"/>', f"<include>: {said}")
@@ -591,9 +584,6 @@ def _mjcfs() -> Iterator[Case]:
     yield refused(
         "free joint inside", '<joint name="twist" axis="1 0 0"/>', "<freejoint/>", "body 'arm': more than 6", line=14
     )
-    yield refused(
-        "free by type inside", 'type="slide" axis="1 0 1"', 'type="free"', "body 'hand': free joint can only", line=18
-    )
     yield refused("unknown type", 'type="slide"', 'type="screw"', "<joint>: invalid keyword: 'screw'")
     hinge = '<joint name="j"/>'
     yield _mjcf(
@@ -604,10 +594,8 @@ def _mjcfs() -> Iterator[Case]:
         hinge,
     )
     yield _mjcf("hinge to the world removed", "<freejoint/>", hinge, options=(("root", "free"),))
-    yield refused("two free joints", "<freejoint/>", '<freejoint/><joint type="free"/>', "body 'trunk': more", line=11)
     yield _mjcf("no free joint", "<freejoint/>", "")
     yield _mjcf("aligned free joint", "<freejoint/>", '<freejoint align="true"/>')
-    yield refused("mocap", '<body name="hand"', '<body name="hand" mocap="true"', "body 'hand': mocap body 'hand' is")
     yield _mjcf(
         "mocap base",
         "<freejoint/>",
@@ -620,8 +608,6 @@ def _mjcfs() -> Iterator[Case]:
     yield _mjcf("joint without name", 'name="twist" ', "")
     yield _mjcf("body without name", 'name="arm" ', "")
     yield refused("joint twice", 'name="twist"', 'name="hip"', "<joint>: repeated name 'hip'", line=16)
-    yield refused("joint twice in two bodies", 'name="slide"', 'name="hip"', "<joint>: repeated name", line=19)
-    yield refused("body twice", '<body name="hand"', '<body name="arm"', "<body>: repeated name 'arm'", line=18)
     yield refused("body called world", '<body name="hand"', '<body name="world"', "<body>: repeated name 'world'")
     yield _mjcf(
         "joint with a name made for another",
@@ -633,41 +619,23 @@ def _mjcfs() -> Iterator[Case]:
     )
     yield _mjcf("reference", 'axis="1 0 0"', 'axis="1 0 0" ref="0.1"')
     yield refused("axis zero", 'axis="1 0 0"', 'axis="0 0 0"', "joint 'twist': axis too small")
-    yield refused("axis of two", 'axis="1 0 0"', 'axis="1 0"', "<joint>: attribute 'axis' does not have enough")
     yield _mjcf("range exchanged", 'range="-1 1"', 'range="1 -1"', "joint 'hip': range: the lower limit 1 is above")
-    yield refused("limited without range", 'axis="1 0 0"', 'axis="1 0 0" limited="true"', "joint 'twist': range")
     yield refused(
         "range without autolimits", 'angle="radian"', 'angle="radian" autolimits="false"', "joint 'hip': ", line=15
     )
-    yield refused("limited misspelt", 'axis="1 0 0"', 'axis="1 0 0" limited="yes"', "<joint>: invalid keyword: 'yes'")
     yield refused("attribute misspelt", 'mass="1"', 'mas="1"', "<inertial>: unrecognized attribute: 'mas'")
-    yield refused("diagonal with a capital", "diaginertia", "diagInertia", "<inertial>: unrecognized attribute: 'diagI")
     said = "<inertial>: mass='nan' is not a number"
     yield _mjcf("mass nan", 'mass="1"', 'mass="nan"', said, line=17)
     for value, said in (
         ("-1", "body 'arm': mass and inertia of moving bodies"),
-        ("1e400", "<inertial>: number is too large in attribute 'mass'"),
         ("1kg", "<inertial>: bad format in attribute 'mass'"),
-        ("1,5", "<inertial>: bad format in attribute 'mass'"),
-        ("", "<inertial>: required attribute missing: 'mass'"),
     ):
         line = 14 if said.startswith("body") else 17
         yield refused(f"mass {value}", 'mass="1"', f'mass="{value}"', said, line=line)
     for value in ("inf", "1e300"):
         yield _mjcf(f"mass {value}", 'mass="1"', f'mass="{value}"', "body 'arm': .*too large", line=14)
     yield _mjcf("far away", 'pos="0.1 0 0" mass', 'pos="1e7 0 0" mass', "body 'arm': its places.*1e\\+06", line=14)
-    yield refused("mass missing", ' mass="1"', "", "<inertial>: required attribute missing: 'mass'", line=17)
     yield refused("inertia missing", ' diaginertia="0.2 0.3 0.4"', "", "body 'trunk': mass and inertia", line=11)
-    yield refused("two inertias", 'mass="3"', 'mass="3" fullinertia="1 1 1 0 0 0"', "body 'trunk': full", line=11)
-    yield refused(
-        "inertia of two", 'diaginertia="0.2 0.3 0.4"', 'diaginertia="0.2 0.3"', "<inertial>: attribute 'diaginertia'"
-    )
-    yield refused(
-        "full inertia turned", 'pos="0.1 0 0" mass', 'pos="0.1 0 0" quat="1 0.1 0 0" mass', "<inertial>: at most one of"
-    )
-    for name, value in (("inertia negative", "-0.4"), ("triangle broken", "0.6")):
-        said = r"body 'trunk': inertia must satisfy A \+ B >= C; use 'balanceinertia'"
-        yield refused(name, 'diaginertia="0.2 0.3 0.4"', f'diaginertia="0.2 0.3 {value}"', said, line=11)
     yield _mjcf(
         "triangle mended",
         'angle="radian"',
@@ -676,11 +644,8 @@ def _mjcfs() -> Iterator[Case]:
     )
     turn = 'euler="0.1 0.2 0.3"'
     yield refused("orientation twice", turn, f'{turn} quat="1 0 0 0"', "<body>: multiple orientation")
-    yield refused("quaternion zero", turn, 'quat="0 0 0 0"', "<body>: zero quaternion")
-    yield refused("axes parallel", turn, 'xyaxes="1 0 0 2 0 0"', "body 'arm': error 'yaxis too small'")
     angle = 'angle="radian"'
     yield refused("euler sequence", angle, f'{angle} eulerseq="xyw"', "body 'arm': .*euler sequence can only", line=14)
-    yield refused("angle unit", angle, 'angle="grad"', "<compiler>: invalid keyword: 'grad'")
     for setting in (
         'boundmass="1"',
         'boundinertia="0.1"',
@@ -690,30 +655,14 @@ def _mjcfs() -> Iterator[Case]:
         'alignfree="true"',
     ):
         yield _mjcf(f"compiler {setting}", angle, f"{angle} {setting}")
-    yield refused("compiler coordinate", angle, f'{angle} coordinate="global"', "<compiler>: global coordinates")
-    yield refused("compiler unknown", angle, 'angles="radian"', "<compiler>: unrecognized attribute: 'angles'")
     line = 'fromto="0 0 0 0.1 0.1 0.2"'
     yield refused("mesh that is nowhere", line, 'type="mesh" mesh="palm"', "geom 'palm': mesh 'palm' not found")
     palm, at = "geom 'palm': ", '<geom name="palm"'
     yield refused("geom without size", 'size="0.05"', "", palm + "size 0 must be positive", at)
-    yield refused("geom of negative size", 'size="0.05"', 'size="-0.05"', palm + "size 0 must be positive", at)
-    yield refused("geom of no length", line, 'fromto="1 0 0 1 0 0"', palm + "fromto points too close")
-    yield refused("geom of two places", line, f'{line} pos="1 0 0"', palm + "both pos and fromto")
-    yield refused("geom of negative density", 'name="palm"', 'name="palm" density="-1"', palm + "mass, inertia or")
     yield _mjcf("geom as a shell", 'name="palm"', 'name="palm" shellinertia="true"')
     slide = '<joint name="slide"'
-    yield refused("class unknown", slide, f'{slide} class="thick"', "<joint>: unknown default class name 'thick'")
-    yield refused("class unknown for children", 'childclass="thin"', 'childclass="thick"', "<body>: unknown", line=18)
     thin = '<default class="thin">'
-    yield refused("class twice", thin, f'<default class="thin"/>\n{thin}', "<default>: repeated default", line=6)
     yield refused("class without name", thin, "<default>", "<default>: empty class name", line=5)
-    for tag, said in (
-        ("replicate", "required attribute missing: 'count'"),
-        ("composite", "unrecognized element"),
-        ("flexcomp", "required attribute missing: 'name'"),
-        ("attach", "required attribute missing: 'prefix'"),
-    ):
-        yield refused(f"{tag} of nothing", slide, f"<{tag}/>{slide}", f"<{tag}>: {said}")
     for tag, name, near in (("frame", "poss", "pos"), ("replicate", "offsett", "offset")):
         yield _mjcf(
             f"{tag} misspelt",

@@ -12,7 +12,7 @@ from .phases import (
     running_phases,
     split,
 )
-from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
+from .recurrence import Returns, momentum_returns
 from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .whole_turns import AthleteTurns, TurnCounts, athlete_turns, turn_counts
 
@@ -20,7 +20,6 @@ __all__ = [
     "ArcErrors",
     "ArcPhases",
     "AthleteTurns",
-    "Crossings",
     "FixedPoints",
     "ForcedSplit",
     "OrbitBranch",
@@ -39,7 +38,6 @@ __all__ = [
     "dynamic_phase_from_energy",
     "fixed_points",
     "momentum_connection",
-    "momentum_crossings",
     "momentum_curvature",
     "momentum_generator",
     "momentum_returns",

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -21,35 +17,31 @@ from ..integrator.sampling import Sampler
 from ..integrator.stepped import SteppedRotation
 
 UP = np.array([0.0, 0.0, 1.0])  # inertial direction of the momentum
-_ROWS_AT_ONCE = 2048  # directions run through the loop together: parts have own samples, whichever process runs them
+_ROWS_AT_ONCE = 2048  # directions run through the loop together, for memory
 _SLOPES_AT_ONCE = 128  # directions with derivatives, some milliseconds each
 _LONGEST_STEP = 0.3  # [rad] of Newton's method
 TINY = float(np.finfo(float).tiny)  # keeps quotients defined
 
-_PartResult = TypeVar("_PartResult")
-
 
 @dataclass(frozen=True)
 class MomentumLoop:
-    """A loop of shapes, sampled once for all evaluations of its map, but for very many directions.
+    """A loop of shapes, sampled once for all evaluations of its map.
 
     Attributes
     ----------
     goal : tolerance [rad]
-    executor : that computes parts of very many directions; None: here
     """
 
     deformation: Deformation
     sampler: Sampler
     goal: float
-    executor: Executor | None = None
 
     @classmethod
-    def of(cls, deformation: Deformation, tolerance: float, executor: Executor | None = None) -> MomentumLoop:
+    def of(cls, deformation: Deformation, tolerance: float) -> MomentumLoop:
         """Return the loop of a deformation whose shape closes. Raises OpenPathError, ShapeError."""
         if deformation.closure is None:
             raise OpenPathError(f"closed orbits need a loop of shapes; this one ends {deformation.shape_gap:.3g} off")
-        return cls(deformation, deformation.sampler(), tolerance_argument(tolerance), executor)
+        return cls(deformation, deformation.sampler(), tolerance_argument(tolerance))
 
     @property
     def accepted(self) -> float:
@@ -64,51 +56,29 @@ class MomentumLoop:
         """Return the motions from any number of directions, some thousand at a time."""
         if len(points) <= _ROWS_AT_ONCE:
             return self.run(magnitude, points)
-        solutions = self._in_parts(MomentumLoop.run, _ROWS_AT_ONCE, magnitude, points, None)
-        places = np.split(np.arange(len(points)), range(_ROWS_AT_ONCE, len(points), _ROWS_AT_ONCE))
-        parts = tuple(RotationPart(rows, part) for rows, part in zip(places, solutions, strict=True))
-        return GroupedRotations(parts, sum(part.interpolant.evaluations for part in solutions))
+        rows = _in_parts(len(points), _ROWS_AT_ONCE)
+        parts = tuple(RotationPart(part, self.run(magnitude, points[part])) for part in rows)
+        return GroupedRotations(parts, self.sampler.evaluations)
 
     def shift(self, magnitude: float, points: Array, tolerance: float) -> Array:
         """u(T) - u(0): (N, 3)."""
-        if len(points) > _ROWS_AT_ONCE:
-            return np.concatenate(self._in_parts(MomentumLoop.shift, _ROWS_AT_ONCE, magnitude, points, tolerance))
-        return ends_of(self.run(magnitude, points, tolerance), points) - points
+        parts = [points[rows] for rows in _in_parts(len(points), _ROWS_AT_ONCE)]
+        return np.concatenate([ends_of(self.run(magnitude, part, tolerance), part) for part in parts]) - points
 
     def exactly(self, magnitude: float, points: Array, tolerance: float | None = None) -> tuple[Array, Array, Array]:
         """u(T) (N, 3), its derivatives by u(0) (N, 3, 3) and by the momentum's magnitude (N, 3)."""
-        if len(points) > _SLOPES_AT_ONCE:
-            parts = self._in_parts(MomentumLoop.exactly, _SLOPES_AT_ONCE, magnitude, points, tolerance)
-            ends, by_start, by_magnitude = (np.concatenate(part) for part in zip(*parts, strict=True))
-            return ends, by_start, by_magnitude
-        solution = self.run(magnitude, points, tolerance)
-        ends = ends_of(solution, points)
-        return ends, *exact_slopes(solution, points, ends, magnitude)
-
-    def _in_parts(
-        self,
-        method: Callable[[MomentumLoop, float, Array, float], _PartResult],
-        most: int,
-        magnitude: float,
-        points: Array,
-        tolerance: float | None,
-    ) -> list[_PartResult]:
-        """Results of a method for at most so many directions at a time, each time with samples of their own."""
-        parts = [points[row : row + most] for row in range(0, len(points), most)]
-        compute = map if self.executor is None else self.executor.map
-        return list(compute(partial(_of_part, method, self.deformation, self.goal, magnitude, tolerance), parts))
+        results = []
+        for rows in _in_parts(len(points), _SLOPES_AT_ONCE):
+            solution = self.run(magnitude, points[rows], tolerance)
+            ends = ends_of(solution, points[rows])
+            results.append((ends, *exact_slopes(solution, points[rows], ends, magnitude)))
+        ends, by_start, by_magnitude = (np.concatenate(parts) for parts in zip(*results, strict=True))
+        return ends, by_start, by_magnitude
 
 
-def _of_part(
-    method: Callable[[MomentumLoop, float, Array, float], _PartResult],
-    deformation: Deformation,
-    goal: float,
-    magnitude: float,
-    tolerance: float | None,
-    points: Array,
-) -> _PartResult:
-    """One part, which may be computed in another process."""
-    return method(MomentumLoop.of(deformation, goal), magnitude, points, tolerance or goal)
+def _in_parts(count: int, most: int) -> list[Integers]:
+    """Rows in parts of at most so many."""
+    return np.split(np.arange(count), range(most, count, most))
 
 
 def ends_of(solution: SteppedRotation | GroupedRotations, points: Array) -> Array:

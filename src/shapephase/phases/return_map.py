@@ -8,7 +8,6 @@ the shape.
 from __future__ import annotations
 
 import contextlib
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_executor, check_object, direction_argument, made_by, magnitude_argument
+from ..arguments import check_object, direction_argument, made_by, magnitude_argument
 from ..arrays import Array, Integers
 from ..card_pictures import sphere_picture
 from ..deformation.deformation import Deformation
@@ -134,7 +133,6 @@ def stroboscopic_map(
     directions: ArrayLike,
     *,
     tolerance: float = 1e-10,
-    executor: Executor | None = None,
 ) -> ReturnMap:
     """The map u(0) -> u(T) of directions of the body momentum over one loop of shapes.
 
@@ -143,8 +141,6 @@ def stroboscopic_map(
     magnitude : of the angular momentum [kg m^2/s]; for 0 the map is the inverse of what the loop alone turns
     directions : (..., 3), of any length above 0, this deformation's frame
     tolerance : of each attitude [rad]
-    executor : of `concurrent.futures`, or of a cluster (`distributed.Client.get_executor()`), that takes more than
-        2048 directions in parts; None: one part after the other, here. Results do not depend on it
 
     Raises
     ------
@@ -165,11 +161,10 @@ def stroboscopic_map(
     [1. 1. 1.]
     """
     check_object(deformation, "Deformation", "deformation")
-    check_executor(executor)
     magnitude = magnitude_argument(magnitude, allow_zero=True)
     start = direction_argument(directions, "directions")
     flat = start.reshape(-1, 3)
-    solution = MomentumLoop.of(deformation, tolerance, executor).run_all(magnitude, flat)
+    solution = MomentumLoop.of(deformation, tolerance).run_all(magnitude, flat)
     return ReturnMap(magnitude, start, ends_of(solution, flat).reshape(start.shape), solution)
 
 
@@ -179,7 +174,6 @@ def fixed_points(
     *,
     tolerance: float | None = None,
     most_directions: int = 100_000,
-    executor: Executor | None = None,
     progress: ProgressCallback | None = None,
 ) -> FixedPoints:
     """Directions of the body momentum that close together with the shape, as many as a search finds.
@@ -202,10 +196,7 @@ def fixed_points(
         1e-10, 1e-9 and 1e-8 that can be met; `FixedPoints.tolerance` says which
     most_directions : 1000 or more at which the map is evaluated, in each of the three searches; about ten seconds
         for 100 000
-    executor : of `concurrent.futures`, or of a cluster (`distributed.Client.get_executor()`), that takes more than
-        2048 directions in parts, and with derivatives more than 128; None: one part after the other, here. Results do
-        not depend on it
-    progress : as for `reconstruct`; parts that an executor takes report nothing
+    progress : as for `reconstruct`
 
     Raises
     ------
@@ -229,14 +220,13 @@ def fixed_points(
     2
     """
     check_object(deformation, "Deformation", "deformation")
-    check_executor(executor)
     magnitude = magnitude_argument(magnitude)
     if not isinstance(most_directions, (int, np.integer)) or most_directions < _FEWEST_DIRECTIONS:
         raise ShapeError(
             f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {value_text(most_directions)}"
         )
     with watched(progress, SEARCH_STRETCH):
-        loop = MomentumLoop.of(deformation, _REACHABLE[0] if tolerance is None else tolerance, executor)
+        loop = MomentumLoop.of(deformation, _REACHABLE[0] if tolerance is None else tolerance)
         looser = _REACHABLE[1:] if tolerance is None else ()
         starts, exhausted = search(loop, magnitude, _STARTS[0], most_directions)
         points = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from itertools import product
+
 import mpmath as mp
 import numpy as np
 import pytest
@@ -15,15 +18,9 @@ from shapephase.rigid_body.geodesics import (
     conjugate_locus,
     conjugate_points,
     conjugate_points_of_momentum,
-    cut_locus,
     cut_time,
     ellipsoid,
-    ellipsoid_period,
     extremal,
-    geodetic_latitude,
-    latitude_of_geodetic,
-    meridian_length,
-    metric_coefficients,
     surface_of_metric,
 )
 from support.independent import assert_within
@@ -58,27 +55,14 @@ def integrals(aspect, p):
     return 4 * mp.quad(speed, places), 2 * mp.quad(turn, places)
 
 
-def test_coefficients_and_the_polar_form_p1():
+def test_the_polar_form_p1():
+    """Lengths of the meridian to parametric latitudes, by the elliptic integral of 30 digits."""
     for aspect in ASPECTS:
-        surface = ellipsoid(aspect)
-        colatitude = np.array([0.0, 0.2, 0.9, np.pi / 2, 2.5, np.pi])
-        first, second = metric_coefficients(aspect, colatitude)
-        point = np.stack([np.sin(colatitude), aspect * np.cos(colatitude)])
-        h = 1e-5
-        ahead = np.stack([np.sin(colatitude + h), aspect * np.cos(colatitude + h)])
-        behind = np.stack([np.sin(colatitude - h), aspect * np.cos(colatitude - h)])
-        np.testing.assert_allclose(np.sum((ahead - behind) ** 2, axis=0) / (2 * h) ** 2, first, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(point[0] ** 2, second, atol=1e-15)
-        length = meridian_length(aspect, colatitude)
+        surface, latitude = ellipsoid(aspect), np.array([-np.pi / 2, -0.9, 0.0, 0.4, np.pi / 2])
         with mp.workdps(30):
-            for angle, value in zip(colatitude, length):
-                exact = mp.ellipe(mp.mpf(angle), 1 - mp.mpf(aspect) ** 2)
-                # A length is counted from the quarter meridian, so it is known to the rounding of that.
-                assert float(value) == pytest.approx(float(exact), rel=1e-13, abs=4.0 * np.finfo(float).eps * length[3])
-        inner = colatitude[1:5]
-        latitude = length[3] - length[1:5]
-        assert_within(surface.latitude(np.cos(inner)), latitude, 2e-13 * max(1.0, aspect))
-        assert_within(surface.metric(latitude), second[1:5], 1e-12)
+            exact = [float(aspect * mp.ellipe(mp.mpf(psi), 1 - 1 / mp.mpf(aspect) ** 2)) for psi in latitude]
+        assert_within(surface.latitude(np.sin(latitude)), exact, 2e-13 * max(1.0, aspect))
+        assert_within(surface.metric(exact[1:4]), np.cos(latitude[1:4]) ** 2, 1e-12)
 
 
 def test_the_surface_of_the_coefficients_alone_is_the_same_p1():
@@ -109,15 +93,17 @@ def test_any_radius_and_poles_that_are_tips_p1():
     np.testing.assert_allclose(locus.points.time, conjugate_points(unit, locus.points.direction).time, rtol=1e-11)
 
 
+def exact_period(aspect, momentum):
+    alpha2 = mp.mpf(aspect) ** 2 + (1 - mp.mpf(momentum) ** 2) * (1 - mp.mpf(aspect) ** 2)
+    return 4 * mp.sqrt(alpha2) * mp.ellipe(1 - mp.mpf(aspect) ** 2 / alpha2)
+
+
 def test_period_in_closed_form_p2():
     p = np.array([0.0, 0.1, 0.5, 0.99, 1.0])
     for aspect in ASPECTS:
-        np.testing.assert_allclose(ellipsoid_period(aspect, p), ellipsoid(aspect).period(p), rtol=3e-14)
         with mp.workdps(30):
-            for one, value in zip(p, ellipsoid_period(aspect, p)):
-                alpha2 = mp.mpf(aspect) ** 2 + (1 - mp.mpf(one) ** 2) * (1 - mp.mpf(aspect) ** 2)
-                exact = 4 * mp.sqrt(alpha2) * mp.ellipe(1 - mp.mpf(aspect) ** 2 / alpha2)
-                assert float(value) == pytest.approx(float(exact), rel=1e-14)
+            for one, value in zip(p, ellipsoid(aspect).period(p)):
+                assert float(value) == pytest.approx(float(exact_period(aspect, one)), rel=3e-14)
 
 
 @pytest.mark.parametrize("count", full_but([2, 4], 2))
@@ -129,9 +115,7 @@ def test_rates_against_mpmath_p2(count):
             aspect, p = float(np.exp(rng.uniform(-2.0, 1.5))), float(rng.uniform(0.02, 0.999))
             surface = ellipsoid(aspect)
 
-            def period(momentum, aspect=aspect):
-                alpha2 = mp.mpf(aspect) ** 2 + (1 - momentum**2) * (1 - mp.mpf(aspect) ** 2)
-                return 4 * mp.sqrt(alpha2) * mp.ellipe(1 - mp.mpf(aspect) ** 2 / alpha2)
+            period = partial(exact_period, aspect)
 
             def turn_rate(momentum, period=period):
                 return mp.diff(period, momentum) / (2 * momentum)
@@ -235,17 +219,6 @@ def test_the_round_sphere_has_one_period_and_one_conjugate_point_p5():
     np.testing.assert_allclose(np.sin(latitude / 2.5), circle[:, 2], atol=1e-14)
 
 
-def test_cut_loci_of_ellipsoids_p6():
-    oblate = cut_locus(ellipsoid(0.5))
-    assert (oblate.kind, oblate.latitudes) == ("parallel", (0.0, 0.0))
-    np.testing.assert_allclose(oblate.longitudes, (0.5 * np.pi, 1.5 * np.pi), atol=1e-13)
-    prolate = cut_locus(ellipsoid(1.5))
-    assert prolate.kind == "meridian"
-    ends = conjugate_points(ellipsoid(1.5), 0.5 * np.pi)
-    np.testing.assert_allclose(prolate.latitudes, np.array([-1, 1]) * np.abs(ends.latitude), atol=1e-14)
-    assert cut_locus(ellipsoid(1.0)).kind == "point"
-
-
 @pytest.mark.parametrize(("flattening", "start"), [(1 / 50, 0.0), (1 / 298, 30.0), (-1 / 50, -20.0)])
 def test_cut_times_against_geographiclib_p6(flattening, start):
     """GeographicLib's inverse problem: the distance to the point at the cut time is that time, beyond it is less."""
@@ -313,14 +286,8 @@ def test_the_period_of_oblate_ellipsoids_is_concave_and_the_combined_quantity_de
     p = np.linspace(0.02, 0.999, 60)
     for aspect in (0.1, 0.3, 0.6, 0.9, 0.999):
         with mp.workdps(30):
-            for one in p[::20]:
-
-                def period(momentum, aspect=aspect):
-                    alpha2 = mp.mpf(aspect) ** 2 + (1 - momentum**2) * (1 - mp.mpf(aspect) ** 2)
-                    return 4 * mp.sqrt(alpha2) * mp.ellipe(1 - mp.mpf(aspect) ** 2 / alpha2)
-
-                assert mp.diff(period, mp.mpf(one), 1) < 0
-                assert mp.diff(period, mp.mpf(one), 2) < 0
+            for one, order in product(p[::20], (1, 2)):
+                assert mp.diff(partial(exact_period, aspect), mp.mpf(one), order) < 0
         surface = ellipsoid(aspect)
         assert (surface.period_rate(p) < 0.0).all()
         assert not (surface.period_second_rate(p) > 0.0).any()
@@ -362,37 +329,4 @@ def test_bad_arguments_are_refused():
     with pytest.raises(ShapeError, match="equatorial_radius"):
         ellipsoid(0.5, 0.0)
     with pytest.raises(ShapeError, match="momentum"):
-        ellipsoid_period(0.5, 1.1)
-    with pytest.raises(ShapeError, match="momentum"):
         ellipsoid(0.5).first_return(1.1)
-
-
-def test_geodetic_latitudes_of_the_earth_against_geographiclib_p1():
-    """The length of the meridian from the equator: GeographicLib's is good to 15 nm."""
-    radius, flattening = 6378137.0, 1.0 / 298.257223563
-    model, degrees = Geodesic(radius, flattening), np.array([-90.0, -33.3, 0.0, 1e-7, 20.0, 45.0, 89.999, 90.0])
-    lengths = [model.Inverse(0.0, 0.0, x, 0.0)["s12"] * np.sign(x) for x in degrees]
-    found = latitude_of_geodetic(1.0 - flattening, np.radians(degrees), radius)
-    assert_within(found, lengths, 2e-8)
-
-
-@pytest.mark.parametrize("aspect", [0.5, 1.0, 1.3])
-def test_geodetic_latitudes_by_quadrature_and_back_p1(aspect):
-    """The meridian has the radius of curvature eps^2 (cos^2 + eps^2 sin^2)^(-3/2) by the geodetic latitude."""
-    degrees = np.array([-90.0, -33.3, 0.0, 1e-7, 20.0, 89.999, 90.0])
-    found = latitude_of_geodetic(aspect, np.radians(degrees))
-    for angle, length in zip(np.radians(degrees), found, strict=True):
-        nodes, weights = np.polynomial.legendre.leggauss(60)
-        inside = 0.5 * angle * (nodes + 1.0)
-        curvature = aspect**2 * (np.cos(inside) ** 2 + (aspect * np.sin(inside)) ** 2) ** -1.5
-        assert length == pytest.approx(0.5 * angle * (weights @ curvature), abs=1e-14)
-    assert found[-1] == pytest.approx(ellipsoid(aspect).reach, abs=1e-14)
-    assert_within(np.degrees(geodetic_latitude(aspect, found)), degrees, 1e-13)
-    assert geodetic_latitude(aspect, 0.0) == latitude_of_geodetic(aspect, 0.0) == 0.0
-
-
-def test_latitudes_beyond_a_pole_are_refused():
-    with pytest.raises(ShapeError, match="geodetic"):
-        latitude_of_geodetic(0.9, 45.0)
-    with pytest.raises(ShapeError, match="latitude"):
-        geodetic_latitude(0.9, 2.0)

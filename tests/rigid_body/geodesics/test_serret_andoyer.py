@@ -579,25 +579,6 @@ def test_conjugate_points_are_zeros_of_the_jacobi_field_r12():
             )
 
 
-def test_the_locus_is_the_envelope_of_the_geodesics_r12():
-    """Neighbouring geodesics cross next to it: the crossing of p - h and p + h is off by h^2."""
-    p, h = 1.55, 1e-3
-    points = METRIC.geodesics(p).conjugate_points()
-
-    def crossing(h):
-        low, high = METRIC.geodesics(p - h), METRIC.geodesics(p + h)
-        s = t = float(points.time)
-        for _ in range(20):
-            gap = np.array([low.phi(s) - high.phi(t), low.theta(s) - high.theta(t)])
-            m = METRIC.m(low.phi(s))
-            columns = [[low.p_phi(s), -high.p_phi(t)], [low.p_theta / m, -high.p_theta / m]]
-            s, t = np.array([s, t]) - np.linalg.solve(np.array(columns), gap)
-        return np.array([low.phi(s), low.theta(s)])
-
-    found = (4.0 * crossing(h) - crossing(2.0 * h)) / 3.0
-    assert found == pytest.approx([points.phi, points.theta], abs=1e-7)
-
-
 def test_two_symmetric_branches_a_cusp_and_the_asymptote_r12_r14():
     """From a horizontal cusp on the equator to the parallel phi = -K/alpha; the mirror image is conjugate too."""
     root = np.sqrt(3.0)
@@ -725,21 +706,7 @@ def separatrix_square(angle):
     return (b - a) * np.sin(angle) ** 2 / b / (c - w)
 
 
-def test_scales_and_signs():
-    """Units of mass and length may be anything; p and -p are mirror images."""
-    p = np.array([1.7, 1.42, 1.3, 0.5])
-    for factor in (1e-12, 1e9):
-        family = serret_andoyer_metric(MOMENTS * factor).geodesics(p * np.sqrt(factor))
-        assert np.abs(family.first_return / METRIC.geodesics(p).first_return - 1.0).max() < 1e-10
-        assert np.abs(family.theta(3.0 * np.sqrt(factor)) / METRIC.geodesics(p).theta(3.0) - 1.0).max() < 1e-12
-    there, back = METRIC.geodesics(p), METRIC.geodesics(-p)
-    assert np.array_equal(there.theta(2.0), -back.theta(2.0))
-    assert np.array_equal(there.phi(2.0), back.phi(2.0))
-    assert np.array_equal(there.first_return, -back.first_return)
-    up, down = METRIC.geodesics(p[:2]), METRIC.geodesics(-p[:2])
-    assert np.array_equal(up.first_return_slope, down.first_return_slope)
-    assert np.array_equal(up.first_return_bend, -down.first_return_bend)
-    assert np.array_equal(up.mean_theta_rate, -down.mean_theta_rate)
+def test_tiny_momenta_keep_their_digits():
     tiny = METRIC.geodesics([1e-12, 1e-30, 1e-300]).theta(7.0)
     assert tiny / np.array([1e-12, 1e-30, 1e-300]) == pytest.approx(METRIC.geodesics(1e-8).theta(7.0) / 1e-8, rel=1e-12)
 

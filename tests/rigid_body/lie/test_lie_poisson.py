@@ -5,7 +5,6 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import product
 
-import casadi
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -225,19 +224,6 @@ def test_motion_is_that_of_the_raw_equations_g1():
     times, start = np.linspace(0.0, 20.0, 41), np.array([0.3, 1.2, -0.8])
     motion = lie_poisson_motion(lambda p: angular_velocity(INERTIA, p), start, times)
     assert_within(motion, rigid_motion(INERTIA, start, times)[0], 1e-11)
-
-
-def test_casimirs_of_so3_are_functions_of_the_length_g2(rng):
-    pi = rng.normal(size=(30, 3))
-    half = 0.5 * np.sum(pi**2, axis=-1, keepdims=True)
-    for slope in (1.0, 2.0 * half, np.cos(half), np.exp(-half)):
-        gradient = slope * pi
-        assert_within(casimir_defect(gradient, pi), 0.0, 1e-15 * np.abs(gradient).max() * 10)
-        assert_within(lie_poisson_bracket(gradient, rng.normal(size=3), pi), 0.0, 1e-13)
-    assert casimir_defect(angular_velocity(INERTIA, pi), pi).min() > 1e-3
-    times = np.linspace(0.0, 30.0, 31)
-    motion = lie_poisson_motion(lambda p: angular_velocity(INERTIA, p), pi[0], times)
-    np.testing.assert_allclose(np.linalg.norm(motion, axis=-1), np.linalg.norm(pi[0]), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -520,27 +506,6 @@ def su2_element(half_turn):
     x, y, z = half_turn / length
     sigma = np.array([[z, x - 1j * y], [x + 1j * y, -z]])
     return np.cos(length) * np.eye(2) - 1j * np.sin(length) * sigma, half_turn
-
-
-def test_momentum_map_is_poisson_proved_with_symbols_g6():
-    # {Pi_i o J, Pi_j o J} = -eps_ijk Pi_k o J, a polynomial identity of degree 2, checked on integers without rounding.
-    q, p = casadi.SX.sym("q", 2), casadi.SX.sym("p", 2)
-    cross = [q[0] * q[1] + p[0] * p[1], q[0] * p[1] - p[0] * q[1]]
-    pi = [-2 * cross[0], -2 * cross[1], -(q[0] ** 2 + p[0] ** 2 - q[1] ** 2 - p[1] ** 2)]
-
-    def bracket(f, g):
-        return casadi.dot(casadi.gradient(f, q), casadi.gradient(g, p)) - casadi.dot(
-            casadi.gradient(f, p), casadi.gradient(g, q)
-        )
-
-    # Four times Pi, so that all coefficients are whole: {4 Pi_i, 4 Pi_j} = 4 (-4 Pi_k).
-    defects = [bracket(pi[i], pi[j]) + 4 * pi[k] for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
-    value = casadi.Function("value", [q, p], [casadi.vertcat(*defects), casadi.vertcat(*pi)])
-    for numbers in product(range(-1, 2), repeat=4):
-        defect, momentum = value(numbers[:2], numbers[2:])
-        assert not np.any(np.array(defect))
-        z = np.array(numbers[:2]) + 1j * np.array(numbers[2:])
-        np.testing.assert_array_equal(4.0 * cayley_klein_momentum(z), np.array(momentum).ravel())
 
 
 def test_poisson_map_for_any_functions_g6(rng):

@@ -15,13 +15,8 @@ from ._ellipsoid import (
     EllipsoidStretch,
     astroid,
     ellipsoid,
-    ellipsoid_period,
-    geodetic_latitude,
-    latitude_of_geodetic,
-    meridian_length,
-    metric_coefficients,
 )
-from ._extremal import Extremal, extremal, variational_jacobi_field
+from ._extremal import Extremal, extremal
 from ._sadov_variables import SadovVariables, andoyer_from_sadov, sadov_frequencies, sadov_variables
 from ._serret_andoyer_constants import (
     GeodesicClass,
@@ -82,13 +77,8 @@ __all__ = [
     "distance_enclosure",
     "distance_enclosure_on_su2",
     "ellipsoid",
-    "ellipsoid_period",
     "extremal",
-    "geodetic_latitude",
-    "latitude_of_geodetic",
     "left_invariant_metric",
-    "meridian_length",
-    "metric_coefficients",
     "nearest_attitude",
     "sadov_frequencies",
     "sadov_variables",
@@ -96,5 +86,4 @@ __all__ = [
     "shortest_geodesic",
     "surface_of_metric",
     "surface_of_stretch",
-    "variational_jacobi_field",
 ]

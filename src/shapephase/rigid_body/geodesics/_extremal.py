@@ -6,14 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
 
 from ...arguments import check_object, number_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
-from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, safe_newton
-from .._flow import TOLERANCE
 from ._arc_quadrature import Arcs
 from .surface_of_revolution import SurfaceOfRevolution
 
@@ -165,42 +162,6 @@ def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array
     square, rest = q * np.sin(phase) ** 2, room + q * np.cos(phase) ** 2
     value, slope, second = (a.reshape(q.shape) for a in surface.stretch(square.ravel(), rest.ravel()))
     return value, slope, second
-
-
-def variational_jacobi_field(
-    surface: SurfaceOfRevolution, direction: float, times: ArrayLike, latitude: float = 0.0
-) -> Array:
-    """`Extremal.jacobi_field` of one direction by integration of Jacobi's equation j'' + G j = 0: (N,) -> (N,).
-
-    The phase is integrated with it, by d chi/dt = 1/D, so that turning points are regular. Times ascend, from 0 on.
-
-    Source: Bonnard et al., definition 2.2.
-    Raises AccuracyNotReached if the integration fails.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> field = geodesics.variational_jacobi_field(geodesics.ellipsoid(1.0), 0.5, [0.0, np.pi / 2.0])
-    >>> print(field.round(9))  # sin t on a sphere
-    [0. 1.]
-    """
-    direction = number_argument(direction, "direction", "rad")
-    t = finite_array(times, "times", (None,))
-    if t.ndim != 1 or not t.size or t[0] < 0.0 or np.any(np.diff(t) < 0.0):
-        raise ShapeError("times: expected ascending times (N,), from 0 on")
-    start = start_of(surface, direction, latitude)
-
-    def rate(_: float, state: Array) -> Array:
-        value, slope = (float(a) for a in stretch_at(surface, start.q, start.room, np.asarray(state[0]))[:2])
-        curvature = (value - 2.0 * float(start.q) * np.sin(state[0]) ** 2 * slope) / value**3
-        return np.array([1.0 / value, state[2], -curvature * state[1]])
-
-    state = [float(start.phase), 0.0, 1.0]
-    span = (0.0, max(float(t[-1]), np.finfo(float).tiny))
-    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=TOLERANCE, atol=1e-15)
-    if not solution.success:
-        raise AccuracyNotReached(f"Jacobi's equation could not be integrated: {solution.message}")
-    return solution.y[1]
 
 
 def _spread(values: Array, times: Array) -> Array:
