@@ -197,6 +197,50 @@ def test_names_in_backticks_become_links_but_in_code(steps):
     )
 
 
+def test_names_in_docstrings_are_code_and_link_where_the_reference_has_them(steps):
+    names = steps("name_links").places(DOCS / "reference")
+    text = (
+        "`split` of `path`, `Motion.save`, ``split`` and :eq:`split`; `view`, `undo`.\n\n>>> f(`split`)\n`split`\n\n`x`"
+    )
+    expected = (
+        ":py:obj:`split <shapephase.split>` of ``path``, :py:obj:`Motion.save <shapephase.Motion.save>`, ``split`` and "
+        ":eq:`split`; ``view``, ``undo``.\n\n>>> f(`split`)\n`split`\n\n``x``"
+    )
+    owner = "shapephase.optimal_control.undo"
+    assert steps("name_links").with_linked_names(text, names, owner, {"path", "view"}) == expected
+
+
+@pytest.mark.parametrize(
+    ("returns", "shown"),
+    [
+        ("(..., 3) [m], which\n    is long", "Array\n    (..., 3) [m], which\n    is long"),
+        ("edges : (3,) [m], a\n    box\naxes : (3, 3)", "edges\n    (3,) [m], a\n    box\naxes\n    (3, 3)"),
+        ("DataFrame\n    `attrs` has units.", "DataFrame\n    `attrs` has units."),
+    ],
+)
+def test_what_a_docstring_says_of_returned_values_is_not_their_type(steps, returns, shown):
+    made = steps("docstrings").returned_values_are_descriptions(f"A.\n\nReturns\n-------\n{returns}\n\nEnd.", "Array")
+    assert made == f"A.\n\nReturns\n-------\n{shown}\n\nEnd."
+
+
+def test_signatures_name_types_that_sphinx_spells_out(steps):
+    union = "~numpy._typing._a._Buffer | _S[~numpy.dtype[Any]] | str | _NestedSequence[complex | bytes | str]"
+    array = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"
+    shown = steps("docstrings").types_by_name(f"(x: {union}, y: ~a.B = <factory>) -> tuple[{array}, {array}]")
+    assert shown == "(x: ArrayLike, y: ~a.B = ...) -> tuple[Array, Array]"
+
+
+def test_lines_break_in_long_names_of_tables_and_headings_and_not_before_a_comma(steps):
+    name, formula = '<span class="pre">a_b/c.py</span>', '<span class="math notranslate nohighlight">\\(x_1.5\\)</span>'
+    body = f"<h2>a_b.c<a></a></h2><p>{name} ({formula}, {formula} {formula}.</p><table><td>{name}</td></table>"
+    shown = steps("line_breaks").with_line_breaks(body)
+    assert shown == (
+        f'<h2>a_<wbr>b.<wbr>c<a></a></h2><p>{name} <span class="unbroken">({formula},</span> {formula} '
+        f'<span class="unbroken">{formula}.</span></p>'
+        '<table><td><span class="pre">a_<wbr>b/<wbr>c.<wbr>py</span></td></table>'
+    )
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))
 def test_links_between_pages_lead_somewhere(page):
     for target in re.findall(r"\]\((?!https?:)([\w./-]+\.md)(?:#[\w-]+)?\)", page.read_text(encoding="utf-8")):

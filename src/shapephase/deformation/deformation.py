@@ -180,6 +180,8 @@ class Deformation:
         ------
         GaugeError
             If only the inertia is known, not the masses (`prescribed`, or a motion read from a file).
+        ShapeError
+            If `angular_velocity` has another shape.
 
         Notes
         -----

@@ -225,6 +225,11 @@ def printed_antenna(
     extension_time, coast : how long the moment grows, and how long the body is then rigid [s]
     on_unphysical : as for `prescribed`
 
+    Raises
+    ------
+    ShapeError
+        For another axis, or if the moment does not grow.
+
     Notes
     -----
     Source: Cabrera 2006, example 4.5; theory.md F3, F4, C-E13.
@@ -295,6 +300,11 @@ def dipole_antenna(
     tip_mass : of each tip [kg]
     reach : distance of each tip mass from the centre at the end [m]
     extension_time, coast : as for `printed_antenna` [s]
+
+    Raises
+    ------
+    ShapeError
+        For another axis.
 
     Notes
     -----
@@ -405,6 +415,11 @@ def rigid_body(moments: ArrayLike = (1.0, 1.5, 2.0), momentum: ArrayLike = (0.6,
     """F9: a rigid body over one period of Pi, known in closed form; its phase is Montgomery's.
 
     Source: Cabrera 2006, examples 2.6 and 3.8; theory.md F9, D12, D17.
+
+    Raises
+    ------
+    TrajectoryError
+        If the momentum does not come back, so that there is no period.
 
     Examples
     --------

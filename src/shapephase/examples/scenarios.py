@@ -74,6 +74,11 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0, *, body: str = 
     duration : of one loop [s]
     body : whose waist it is, "cat_two_halves" or "cat_untwisted", whose angles are singular at no bend
 
+    Raises
+    ------
+    TrajectoryError
+        If the angles are outside these limits.
+
     Notes
     -----
     Equation :eq:`kane-scher` of the documentation.

@@ -79,11 +79,16 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     height : [in]
     projection : None: flat; "3d"
 
+    Raises
+    ------
+    ShapeError
+        If the height is not above 0.
+    MissingExtraError
+        If Matplotlib is not installed.
+
     Notes
     -----
     The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it.
-
-    Raises MissingExtraError.
 
     Examples
     --------

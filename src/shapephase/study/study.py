@@ -115,6 +115,8 @@ class Study(CaseTable):
             Without Zarr.
         RunStopped
             If `progress` stopped it.
+        StudyError
+            If `workers` is not a whole number of 0 or more, is given beside a client, or is 0 with a time limit.
         """
         check_file_name(store, "store")
         check_flag(resume, "resume")

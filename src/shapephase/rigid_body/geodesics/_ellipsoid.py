@@ -118,6 +118,11 @@ def ellipsoid_period(aspect: float, momentum: ArrayLike) -> Array:
 
     Source: Bonnard et al., section 2; theory.md P2.
 
+    Raises
+    ------
+    ShapeError
+        If a momentum is larger than 1 in absolute value.
+
     Examples
     --------
     >>> print(f"{sp.rigid_body.geodesics.ellipsoid_period(1.0, 0.5):.9f} = 2 pi")  # of a sphere
@@ -163,6 +168,11 @@ def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: 
     aspect, equatorial_radius : as for `ellipsoid`
     geodetic : (...) from -pi/2 to pi/2 [rad]
 
+    Raises
+    ------
+    ShapeError
+        If a latitude is beyond a pole.
+
     Examples
     --------
     >>> north = sp.rigid_body.geodesics.latitude_of_geodetic(1.0 - 1.0 / 298.257223563, np.radians(45.0), 6378137.0)
@@ -180,6 +190,11 @@ def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: 
 
 def geodetic_latitude(aspect: float, latitude: ArrayLike, equatorial_radius: float = 1.0) -> Array:
     """The geodetic latitude of phi, the inverse of `latitude_of_geodetic`: (...) -> (...) [rad].
+
+    Raises
+    ------
+    ShapeError
+        If a latitude is beyond a pole.
 
     Examples
     --------

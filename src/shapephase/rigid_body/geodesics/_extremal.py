@@ -175,7 +175,13 @@ def variational_jacobi_field(
     The phase is integrated with it, by d chi/dt = 1/D, so that turning points are regular. Times ascend, from 0 on.
 
     Source: Bonnard et al., definition 2.2.
-    Raises AccuracyNotReached if the integration fails.
+
+    Raises
+    ------
+    ShapeError
+        If the times do not ascend from 0 on.
+    AccuracyNotReached
+        If the integration fails.
 
     Examples
     --------

@@ -305,8 +305,6 @@ def surface_of_stretch(
 ) -> SurfaceOfRevolution:
     """A surface by its stretch D(Y), see the module.
 
-    Raises AccuracyNotReached if D is too rough for the quadrature to settle.
-
     Parameters
     ----------
     stretch : Y and depth - Y, (N,) each -> D, D', D'' (N,) each, D > 0; smooth for 0 <= Y < depth, and up to depth
@@ -315,6 +313,13 @@ def surface_of_stretch(
     depth : Y at the reach; 1 for a pole
     end : "pole", "parallel" or "boundary"
     closed_arcs : the integrals along extremals in closed form, where known
+
+    Raises
+    ------
+    ShapeError
+        If `end` and `depth` do not belong to each other, or D is not positive.
+    AccuracyNotReached
+        If D is too rough for the quadrature to settle.
 
     Examples
     --------
