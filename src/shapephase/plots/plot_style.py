@@ -257,19 +257,17 @@ def panel_size(ax: Any) -> tuple[float, float]:
 
 
 def finish_below(ax: Any, **place: Any) -> Any:
-    """Finish a picture in axes of equal scales, with room inside them for the legend below it; returns the legend.
-
-    The axes fill their panel: an image cropped to them, as a notebook shows it, keeps the whole legend.
-    """
+    """Finish a picture in axes of equal scales, with room inside them for the legend below it; returns the legend."""
     legend = finish(ax, loc="lower center", borderaxespad=0.0, **place)
     # A legend wider than the axes would make the layout shrink them.
     legend.set_in_layout(False)
+    # A notebook would crop the image to the axes: the figure's own patch keeps all of it.
+    ax.figure.patch.set_in_layout(True)
     width, height = panel_size(ax)
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     needed = _LEGEND_GAP + _extent(legend).height / ax.figure.dpi
     scale = max((right - left) / width, (top - bottom) / max(height - needed, _LEAST_PICTURE))
-    middle, half = 0.5 * (left + right), 0.5 * max(right - left, (width - _BESIDE_LEGEND) * scale)
-    ax.set(xlim=(middle - half, middle + half), ylim=(bottom - needed * scale, top))
+    ax.set_ylim(bottom - needed * scale, top)
     return legend
 
 
