@@ -7,7 +7,7 @@ import re
 _TABLE = re.compile(r"<table.*?</table>", re.DOTALL)
 _WORD = re.compile(r'(?<=<span class="pre">)[^<]+')
 _HEADING = re.compile(r"(?<=<h2>)[\w.]+")
-_BETWEEN_PARTS = re.compile(r"(?<=\w)([_./:])(?=\w)")
+_BETWEEN_PARTS = re.compile(r"(?<=\w)[_./:](?=\w)|(?<=[a-z])(?=[A-Z])")
 # MathJax makes boxes of formulas, beside which a browser breaks a line whatever the next letter is.
 _FORMULA = re.compile(r'([(\[“]*)(<span class="math notranslate nohighlight">[^<]*</span>)([)\]”’,.;:!?]*)')
 
@@ -19,7 +19,7 @@ def with_line_breaks(body: str) -> str:
 
 
 def _with_breaks(name: re.Match[str]) -> str:
-    return _BETWEEN_PARTS.sub(r"\1<wbr>", name[0])
+    return _BETWEEN_PARTS.sub(lambda gap: f"{gap[0]}<wbr>", name[0])
 
 
 def _kept_together(formula: re.Match[str]) -> str:
