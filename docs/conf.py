@@ -31,7 +31,7 @@ from _site.gallery_rows import with_rows
 from _site.line_breaks import with_line_breaks
 from _site.live_pages import write_live_pages
 from _site.name_links import places, with_linked_names, with_names
-from _site.reference_pages import write_reference
+from _site.reference_pages import constant_documentation, write_reference
 
 import shapephase
 
@@ -83,7 +83,7 @@ autosummary_generate = False
 autodoc_default_options = {
     "members": True,
     # Methods of a base class of our own are on the page of the class that users have.
-    "inherited-members": "object,BaseException,Sequence,Mapping,tuple,str,int,Protocol,Enum",
+    "inherited-members": "object,BaseException,Sequence,Mapping,tuple,str,int,Protocol,Enum,OSError,ImportError",
 }
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
@@ -141,14 +141,19 @@ def _add_targets(_: Sphinx, page: str, source: list[str]) -> None:
         source[0] = with_rows(source[0], HERE / "gallery" / "rows", places(HERE / "reference"))
 
 
-def _plain_docstring(_app: Sphinx, _what: str, name: str, found: Any, _options: Any, lines: list[str]) -> None:
+def _plain_docstring(_app: Sphinx, what: str, name: str, found: Any, _options: Any, lines: list[str]) -> None:
+    if what == "data" and not any(lines):
+        lines[:] = constant_documentation(name)
     text = returned_values_are_descriptions("\n".join(lines), returned_type(found))
     text = entries_are_descriptions(bars_are_norms(text))
     lines[:] = with_linked_names(with_links(text), places(HERE / "reference"), name, own_names(found)).split("\n")
 
 
 def _plain_signature(*event: Any) -> tuple[str, str] | None:
-    signature, returned = event[-2:]
+    """Types by their names; and none for a protocol, which nobody calls."""
+    found, signature, returned = event[3], *event[-2:]
+    if getattr(found, "_is_protocol", False):
+        return "", ""
     return (types_by_name(signature or ""), types_by_name(returned or "")) if signature or returned else None
 
 

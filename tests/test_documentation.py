@@ -340,3 +340,8 @@ def test_there_are_25_questions_each_with_a_command():
     questions = re.findall(r"^### ([^\n]*)\n(.*?)(?=^###? |\Z)", SHOWN[0], re.MULTILINE | re.DOTALL)
     assert len(questions) >= 25
     assert not [title for title, answer in questions if "```text\nshapephase " not in answer]
+
+
+def test_a_constant_has_the_text_below_its_definition(steps):
+    documented = steps("reference_pages").constant_documentation("shapephase.examples.CLOSED_ORBITS")
+    assert documented[0].startswith("Motions whose shape and momentum close together")

@@ -376,7 +376,7 @@ def furniture(
 def cat(halves: bool = False) -> Example:
     """F7: the cat rights itself at zero momentum, by 180 degrees: a realistic one, or Kane and Scher's (`halves`).
 
-    Source: Kane and Scher 1969; `scenarios.kane_scher`, `scenarios.cat_righting`; theory.md F7 and section 7.
+    Source: Kane and Scher 1969; `kane_scher`, `cat_righting`; theory.md F7 and section 7.
 
     Examples
     --------
@@ -396,7 +396,7 @@ def cat(halves: bool = False) -> Example:
 def astronaut(legs: bool = False) -> Example:
     """F8: the astronaut pitches at zero momentum, 11.825049 degrees by circling the arms, 12.352775 by the legs.
 
-    Source: `scenarios.astronaut_arm_circles`, `scenarios.astronaut_leg_swing`; theory.md F8.
+    Source: `astronaut_arm_circles`, `astronaut_leg_swing`; theory.md F8.
 
     Examples
     --------
@@ -451,6 +451,13 @@ EXAMPLES: Mapping[str, Callable[[], Example]] = {
     "astronaut": astronaut,
     "rigid_body": rigid_body,
 }
+"""Examples of the theory by name; a call makes one with its default parameters.
+
+Examples
+--------
+>>> sp.examples.EXAMPLES["furniture"]().deformation.duration
+20.0
+"""
 
 
 def linked_pentagon() -> ParticleBody:

@@ -337,13 +337,26 @@ MOTIONS: Mapping[str, NamedMotion] = {
         "diver", five_stage_dive, "1.5 somersaults with a twist, into the plane again, momentum 0 57.735688525 0"
     ),
 }
+"""Motions that come with the library, by name: functions and commands take such a name in place of a path.
 
-# Motions whose shape and momentum close together: the loop of shapes, and the momentum's magnitude [kg m^2/s].
+Examples
+--------
+>>> sp.examples.MOTIONS["satellite_sweep"].body
+'satellite'
+"""
+
 CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {
     "cat": ("cat_righting", 0.005),
     "astronaut": ("astronaut_leg_swing", 2.0),
     "satellite": ("satellite_sweep", 1.0),
 }
+"""Motions whose shape and momentum close together: the loop of shapes, and the momentum's magnitude [kg m^2/s].
+
+Examples
+--------
+>>> sp.examples.CLOSED_ORBITS["cat"]
+('cat_righting', 0.005)
+"""
 
 
 def named_motion(name: str, body: Body | ParticleBody | str | None = None) -> ShapePath:
