@@ -16,8 +16,8 @@ _LOG = logging.getLogger(__name__)
 from _site.code_links import with_links, with_targets
 from _site.coverage import write_tables
 from _site.docstrings import (
-    bars_are_norms,
     entries_are_descriptions,
+    formulas_are_text,
     name_aliases,
     own_names,
     returned_type,
@@ -145,7 +145,7 @@ def _plain_docstring(_app: Sphinx, what: str, name: str, found: Any, _options: A
     if what == "data" and not any(lines):
         lines[:] = constant_documentation(name)
     text = returned_values_are_descriptions("\n".join(lines), returned_type(found))
-    text = entries_are_descriptions(bars_are_norms(text))
+    text = entries_are_descriptions(formulas_are_text(text))
     lines[:] = with_linked_names(with_links(text), places(HERE / "reference"), name, own_names(found)).split("\n")
 
 

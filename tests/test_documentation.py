@@ -223,6 +223,13 @@ def test_what_a_docstring_says_of_returned_values_is_not_their_type(steps, retur
     assert made == f"A.\n\nReturns\n-------\n{shown}\n\nEnd."
 
 
+def test_formulas_in_docstrings_are_text_but_in_code(steps):
+    text = "H = M . B of |M|, (...) -> (..., 3).\n\n>>> f(|x|)  # a . b ...\n1 . 2\n\nThen `|Pi| . x` and |Pi|."
+    shown = steps("docstrings").formulas_are_text(text)
+    bars = text.split("\n")[0].replace("|", "\\|").replace(" . ", " · ").replace("...", "…").replace("->", "→")
+    assert shown.split("\n") == [bars, *text.split("\n")[1:-1], "Then `|Pi| . x` and \\|Pi\\|."]
+
+
 def test_signatures_name_types_that_sphinx_spells_out(steps):
     union = "~numpy._typing._a._Buffer | _S[~numpy.dtype[Any]] | str | _NestedSequence[complex | bytes | str]"
     array = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Callable
+from itertools import cycle
 from typing import Any
 
 from sphinx.util.inspect import TypeAliasForwardRef
 
 _LITERAL = re.compile(r"(``.+?``|`[^`]+`)", re.DOTALL)
+_EXAMPLE = re.compile(r"^ *>>> .*(?:\n(?! *$).*)*", re.MULTILINE)
+_DOT_PRODUCT = re.compile(r"(?<=\S) \. (?=\S)")
 _ENTRY = re.compile(r"([\w*, ]+) : (.*)")
 # What Sphinx shows in place of names: the members of NumPy's union, its arrays, and defaults that dataclasses make.
 _PREFIX = r"~?(?:[a-z_]\w*\.)*"
@@ -22,10 +26,24 @@ _TYPE_ALONE = re.compile(r"[\w.]+\n    ")
 _WITH_ENTRIES = ("Parameters", "Attributes", "Other Parameters")
 
 
-def bars_are_norms(text: str) -> str:
-    """`|Pi|` is the norm of Pi: to reStructuredText it would be a substitution."""
-    parts = _LITERAL.split(text)
-    return "".join(part if place % 2 else part.replace("|", "\\|") for place, part in enumerate(parts))
+def formulas_are_text(text: str) -> str:
+    """`|Pi|` is a norm, `a . b` a product that ends no sentence, and the two signs of an arrow stay together."""
+    return outside_examples(text, lambda prose: "".join(map(_formula, _LITERAL.split(prose), cycle((True, False)))))
+
+
+def _formula(part: str, prose: bool) -> str:
+    for written, shown in (("|", "\\|"), ("...", "…"), ("->", "→")) if prose else ():
+        part = part.replace(written, shown)
+    return _DOT_PRODUCT.sub(" · ", part) if prose else part
+
+
+def outside_examples(text: str, change: Callable[[str], str]) -> str:
+    """The text with its parts between examples changed."""
+    parts, end = [], 0
+    for example in _EXAMPLE.finditer(text):
+        parts += [change(text[end : example.start()]), example[0]]
+        end = example.end()
+    return "".join([*parts, change(text[end:])])
 
 
 def entries_are_descriptions(text: str) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from .docstrings import outside_examples
 from .reference_pages import questions
 
 _FENCE = re.compile(r"^(```|:::)")
@@ -20,18 +21,12 @@ _MEMBERS = (property, cached_property, classmethod, staticmethod)
 # Of reStructuredText: neither a role's text nor a literal.
 _BACKTICKS = re.compile(r"(?<![`:\w])`([^`<>]+)`(?![`_\w])")
 _WHOLE_NAME = re.compile(_NAME)
-_EXAMPLE = re.compile(r"^ *>>> .*(?:\n(?! *$).*)*", re.MULTILINE)
 
 
 @cache
 def places(folder: Path) -> dict[str, str]:
-    """Functions, classes and their members in the reference by each name that is enough to tell which is meant."""
-    names = {
-        name: found
-        for page in questions(folder)
-        for name, found in page["objects"].items()
-        if inspect.isclass(found) or inspect.isroutine(found)
-    }
+    """What the reference has, and members of classes, by each name that is enough to tell which is meant."""
+    names = {name: found for page in questions(folder) for name, found in page["objects"].items()}
     members = {f"{name}.{member}": None for name, found in names.items() for member in _documented_members(found)}
     endings: dict[str, list[str]] = {}
     for name, least in [*((name, 1) for name in names), *((name, 2) for name in members)]:
@@ -81,13 +76,4 @@ def with_linked_names(text: str, names: dict[str, str], owner: str, own: set[str
         target = names.get(name[1]) if name and name[1] not in own else None
         return f":py:obj:`{found[1]} <{target}>`" if target and target != owner else f"``{found[1]}``"
 
-    return _outside_examples(text, lambda part: _BACKTICKS.sub(code, part))
-
-
-def _outside_examples(text: str, change: Callable[[str], str]) -> str:
-    """The text with its parts between examples changed."""
-    parts, end = [], 0
-    for example in _EXAMPLE.finditer(text):
-        parts += [change(text[end : example.start()]), example[0]]
-        end = example.end()
-    return "".join([*parts, change(text[end:])])
+    return outside_examples(text, lambda part: _BACKTICKS.sub(code, part))

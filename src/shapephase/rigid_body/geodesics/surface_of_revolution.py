@@ -303,7 +303,7 @@ def _trend(rates: Array, rounding: float) -> str:
 def surface_of_stretch(
     stretch: Stretch, equator: float, depth: float, end: str = "pole", closed_arcs: ClosedArcs | None = None
 ) -> SurfaceOfRevolution:
-    """A surface by its stretch D(Y), see the module.
+    """A surface by its stretch D(Y) = (d phi/dy) sqrt(1 - Y) with y^2 = Y = 1 - m(phi)/m(0); D = 1 on the unit sphere.
 
     Parameters
     ----------
