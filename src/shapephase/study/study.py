@@ -60,9 +60,9 @@ class Study(CaseTable):
         compared by their code and all that it refers to when the study is resumed
     root, root_body, packages, xacro_args, on_unphysical : how the bodies' files are read, as for `load_body`
     length_unit, person_mass : of the bodies' BVH files, as for `load_body` [m, kg]
-    recording : arguments of `read_recorded_motion` for motions from files, `{"flight": "all"}`, and those of one file by
-        its name, `{"a.csv": {"flight": (0.2, 1.1)}}`; momentum and attitude are then fitted to the base of each file, as
-        `motion_from_recording` does; None: the momentum is as given
+    recording : arguments of `read_recorded_motion` for motions from files, `{"flight": "all"}`, and those of one file
+        by its name, `{"a.csv": {"flight": (0.2, 1.1)}}`; momentum and attitude are then fitted to the base of each
+        file, as `motion_from_recording` does; None: the momentum is as given
 
     Raises
     ------
