@@ -6,6 +6,7 @@ import re
 
 _TABLE = re.compile(r"<table.*?</table>", re.DOTALL)
 _WORD = re.compile(r'(?<=<span class="pre">)[^<]+')
+_LONG_WORD = re.compile(r'(?<=<span class="pre">)[^<]{30,}')
 _HEADING = re.compile(r"(?<=<h2>)[\w.]+")
 _BETWEEN_PARTS = re.compile(r"(?<=\w)[_./:](?=\w)|(?<=[a-z])(?=[A-Z])")
 # MathJax makes boxes of formulas, beside which a browser breaks a line whatever the next letter is.
@@ -14,7 +15,9 @@ _FORMULA = re.compile(r'([(\[“]*)(<span class="math notranslate nohighlight">[
 
 def with_line_breaks(body: str) -> str:
     """The HTML of a page with these places marked."""
-    body = _HEADING.sub(_with_breaks, _TABLE.sub(lambda table: _WORD.sub(_with_breaks, table[0]), body))
+    body = _TABLE.sub(lambda table: _WORD.sub(_with_breaks, table[0]), body)
+    for names in (_LONG_WORD, _HEADING):
+        body = names.sub(_with_breaks, body)
     return _FORMULA.sub(_kept_together, body)
 
 
