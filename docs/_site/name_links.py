@@ -19,7 +19,7 @@ _NAME = r"(?:sp\.)?([A-Za-z]\w+(?:\.\w+)*)(?:\(\))?"
 _CODE = re.compile(rf"(?<![`\w}}])`{_NAME}`(?!`)")
 _MEMBERS = (property, cached_property, classmethod, staticmethod)
 # Of reStructuredText: neither a role's text nor a literal.
-_BACKTICKS = re.compile(r"(?<![`:\w])`([^`<>]+)`(?![`_\w])")
+_BACKTICKS = re.compile(r"(?<![`:>\w])`([^`]+)`(?![`_\w])")
 _WHOLE_NAME = re.compile(_NAME)
 
 
