@@ -142,8 +142,8 @@ def _add_targets(_: Sphinx, page: str, source: list[str]) -> None:
 
 
 def _plain_docstring(_app: Sphinx, what: str, name: str, found: Any, _options: Any, lines: list[str]) -> None:
-    if what == "data" and not any(lines):
-        lines[:] = constant_documentation(name)
+    if what == "data":
+        lines[:] = constant_documentation(name) or lines
     text = returned_values_are_descriptions("\n".join(lines), returned_type(found))
     text = entries_are_descriptions(formulas_are_text(text))
     lines[:] = with_linked_names(with_links(text), places(HERE / "reference"), name, own_names(found)).split("\n")
