@@ -63,10 +63,9 @@ def _definitions(file: str) -> dict[str, int]:
 def constant_documentation(name: str) -> list[str]:
     """What stands below the definition of a constant in another module than that of its name, where autodoc looks."""
     face, _, short = name.rpartition(".")
-    found = _found(name)
     for key, module in sorted(sys.modules.items()):
         file = getattr(module, "__file__", None)
-        if key.startswith(f"{face}.") and file and vars(module).get(short) is found:
+        if key.startswith(f"{face}.") and file and hasattr(module, short):
             for node, below in pairwise(ast.parse(Path(file).read_text(encoding="utf-8")).body):
                 if short in _assigned(node) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
                     return inspect.cleandoc(str(below.value.value)).split("\n")
