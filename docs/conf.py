@@ -15,14 +15,23 @@ _LOG = logging.getLogger(__name__)
 
 from _site.code_links import with_links, with_targets
 from _site.coverage import write_tables
-from _site.docstrings import bars_are_norms, entries_are_descriptions, name_aliases
+from _site.docstrings import (
+    entries_are_descriptions,
+    formulas_are_text,
+    name_aliases,
+    own_names,
+    returned_type,
+    returned_values_are_descriptions,
+    types_by_name,
+)
 from _site.equations import citing, with_citations
 from _site.executed_notebooks import library_digest, quiet_kernels, write_pages
 from _site.forked_kernels import fork_kernels
 from _site.gallery_rows import with_rows
+from _site.line_breaks import with_line_breaks
 from _site.live_pages import write_live_pages
-from _site.name_links import places, with_names
-from _site.reference_pages import write_reference
+from _site.name_links import places, with_linked_names, with_names
+from _site.reference_pages import constant_documentation, write_reference
 
 import shapephase
 
@@ -73,16 +82,15 @@ nb_merge_streams = True
 autosummary_generate = False
 autodoc_default_options = {
     "members": True,
-    "undoc-members": False,
     # Methods of a base class of our own are on the page of the class that users have.
-    "inherited-members": "object,BaseException,Sequence,Mapping,tuple,str,int,Protocol,Enum",
+    "inherited-members": "object,BaseException,Sequence,Mapping,tuple,str,int,Protocol,Enum,OSError,ImportError",
 }
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"
 _ALIASES = "Array ArrayLike Integers Mask Gauge Given Gradient Matrices Spinor Curve Evaluate Meridian Profile Stretch"
-autodoc_type_aliases = {name: name for name in (*_ALIASES.split(), "Colour", "Directly")}
+autodoc_type_aliases = {name: name for name in (*_ALIASES.split(), "Colour", "Directly", "RotorValue")}
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 100
 numpydoc_show_class_members = False
@@ -133,9 +141,25 @@ def _add_targets(_: Sphinx, page: str, source: list[str]) -> None:
         source[0] = with_rows(source[0], HERE / "gallery" / "rows", places(HERE / "reference"))
 
 
-def _plain_docstring(*event: Any) -> None:
-    lines = event[-1]
-    lines[:] = with_links(entries_are_descriptions(bars_are_norms("\n".join(lines)))).split("\n")
+def _plain_docstring(_app: Sphinx, what: str, name: str, found: Any, _options: Any, lines: list[str]) -> None:
+    if what == "data":
+        lines[:] = constant_documentation(name) or lines
+    text = returned_values_are_descriptions("\n".join(lines), returned_type(found))
+    text = entries_are_descriptions(formulas_are_text(text))
+    lines[:] = with_linked_names(with_links(text), places(HERE / "reference"), name, own_names(found)).split("\n")
+
+
+def _plain_signature(*event: Any) -> tuple[str, str] | None:
+    """Types by their names; and none for a protocol, which nobody calls."""
+    found, signature, returned = event[3], *event[-2:]
+    if getattr(found, "_is_protocol", False):
+        return "", ""
+    return (types_by_name(signature or ""), types_by_name(returned or "")) if signature or returned else None
+
+
+def _mark_line_breaks(_app: Sphinx, _page: str, _template: str, context: dict[str, Any], _tree: Any) -> None:
+    if "body" in context:
+        context["body"] = with_line_breaks(context["body"])
 
 
 def setup(app: Sphinx) -> None:
@@ -144,5 +168,7 @@ def setup(app: Sphinx) -> None:
     app.add_config_value("library", "", "env", str)
     app.connect("config-inited", _write_pages)
     app.connect("source-read", _add_targets)
+    app.connect("html-page-context", _mark_line_breaks)
+    app.connect("autodoc-process-signature", _plain_signature)
     # Before numpydoc, which makes sections of the text.
     app.connect("autodoc-process-docstring", _plain_docstring, priority=400)

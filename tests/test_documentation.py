@@ -196,6 +196,57 @@ def test_names_in_backticks_become_links_but_in_code(steps):
     )
 
 
+def test_names_in_docstrings_are_code_and_link_where_the_reference_has_them(steps):
+    names = steps("name_links").places(DOCS / "reference")
+    text = "`split` of `path`, `Motion.save`, ``split``, :eq:`split`; `a,<b>`.\n\n>>> f(`split`)\n`split`\n\n`undo`"
+    expected = (
+        ":py:obj:`split <shapephase.split>` of ``path``, :py:obj:`Motion.save <shapephase.Motion.save>`, ``split``, "
+        ":eq:`split`; ``a,<b>``.\n\n>>> f(`split`)\n`split`\n\n``undo``"
+    )
+    owner = "shapephase.optimal_control.undo"
+    assert steps("name_links").with_linked_names(text, names, owner, {"path"}) == expected
+
+
+@pytest.mark.parametrize(
+    ("returns", "shown"),
+    [
+        ("(..., 3) [m], which\n    is long", "Array\n    (..., 3) [m], which\n    is long"),
+        ("edges : (3,) [m], a\n    box\naxes : (3, 3)", "edges\n    (3,) [m], a\n    box\naxes\n    (3, 3)"),
+        ("DataFrame\n    `attrs` has units.", "DataFrame\n    `attrs` has units."),
+    ],
+)
+def test_what_a_docstring_says_of_returned_values_is_not_their_type(steps, returns, shown):
+    made = steps("docstrings").returned_values_are_descriptions(f"A.\n\nReturns\n-------\n{returns}\n\nEnd.", "Array")
+    assert made == f"A.\n\nReturns\n-------\n{shown}\n\nEnd."
+
+
+def test_formulas_in_docstrings_are_text_but_in_code(steps):
+    text = "H = M . B of |M|, (...) -> (..., 3).\n\n>>> f(|x|)  # a . b ...\n1 . 2\n\nThen `|Pi| . x` and |Pi|."
+    shown = steps("docstrings").formulas_are_text(text)
+    bars = text.split("\n")[0].replace("|", "\\|").replace(" . ", " · ").replace("...", "…").replace("->", "→")
+    assert shown.split("\n") == [bars, *text.split("\n")[1:-1], "Then `|Pi| . x` and \\|Pi\\|."]
+
+
+def test_signatures_name_types_that_sphinx_spells_out(steps):
+    union = "~numpy._typing._a._Buffer | _S[~numpy.dtype[Any]] | str | _NestedSequence[complex | bytes | str]"
+    array = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"
+    shown = steps("docstrings").types_by_name(f"(x: {union}, y: ~a.B = <factory>) -> tuple[{array}, {array}]")
+    assert shown == "(x: ArrayLike, y: ~a.B = ...) -> tuple[Array, Array]"
+
+
+def test_lines_break_in_long_names_of_tables_and_headings_and_not_before_a_comma(steps):
+    name, formula = '<span class="pre">a_b/c.py</span>', '<span class="math notranslate nohighlight">\\(x_1.5\\)</span>'
+    body = (
+        f"<h2>a_b.CrownRegion<a></a></h2><p>{name} ({formula}, {formula} {formula}.</p><table><td>{name}</td></table>"
+    )
+    shown = steps("line_breaks").with_line_breaks(body)
+    assert shown == (
+        f'<h2>a_<wbr>b.<wbr>Crown<wbr>Region<a></a></h2><p>{name} <span class="unbroken">({formula},</span> {formula} '
+        f'<span class="unbroken">{formula}.</span></p>'
+        '<table><td><span class="pre">a_<wbr>b/<wbr>c.<wbr>py</span></td></table>'
+    )
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))
 def test_links_between_pages_lead_somewhere(page):
     for target in re.findall(r"\]\((?!https?:)([\w./-]+\.md)(?:#[\w-]+)?\)", page.read_text(encoding="utf-8")):
@@ -293,3 +344,8 @@ def test_there_are_25_questions_each_with_a_command():
     questions = re.findall(r"^### ([^\n]*)\n(.*?)(?=^###? |\Z)", SHOWN[0], re.MULTILINE | re.DOTALL)
     assert len(questions) >= 25
     assert not [title for title, answer in questions if "```text\nshapephase " not in answer]
+
+
+def test_a_constant_has_the_text_below_its_definition(steps):
+    documented = steps("reference_pages").constant_documentation("shapephase.examples.CLOSED_ORBITS")
+    assert documented[0].startswith("Motions whose shape and momentum close together")

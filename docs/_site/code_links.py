@@ -9,7 +9,7 @@ _ENTRY = re.compile(rf"^- \*\*({CODE})\*\*", re.MULTILINE)
 _SECTION = re.compile(r"^## (\d+)\. ", re.MULTILINE)
 _CITATION = re.compile(
     r"\b(theory|numerics)\.md"
-    rf"((?:[ ,;:(-]|\n|and\b|to\b|its\b|errata\b|sections?\b|\d+\b|{CODE}\b|[A-U]\b)*)"
+    rf"((?:[ ,;:()-]|\n|and\b|to\b|its\b|errata\b|sections?\b|\d+\b|{CODE}\b|[A-U]\b)*)"
 )
 _SECTIONS_CITED = re.compile(r"(sections?\s+)(\d+(?:(?:,| and)\s+\d+)*)")
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from .code_links import CODE
+from .name_links import places, with_names
 
 _ENTRY = re.compile(rf"^- \*\*({CODE})\*\* (.*(?:\n  .*)*)", re.MULTILINE)
 _CITED = re.compile(rf"theory\.md((?:[ ,;:(-]|\n|and\b|to\b|errata\b|{CODE}\b)*)")
@@ -108,22 +109,31 @@ def write_tables(root: Path) -> None:
     folder = root / "docs" / "theory" / "tables"
     folder.mkdir(exist_ok=True)
     for name, misprint in (("misprints", True), ("coverage", False)):
-        lines = ["| code | what holds | tests |" if misprint else "| code | functions | tests |", "|---|---|---|"]
+        lines = [
+            "| code | misprint, and what holds | tests |" if misprint else "| code | functions | tests |",
+            "|---|---|---|",
+        ]
         for code, (text, functions, tests) in rows.items():
             if ("-E" in code) == misprint:
                 middle = re.sub(r"\s*\n\s*", " ", text).replace("|", "\\|") if misprint else _some(functions)
-                lines.append(f"| [{code}](../theory.md#code-{code.lower()}) | {middle} | {_some(tests)} |")
-        file = folder / f"{name}.inc"
-        text = "\n".join(lines) + "\n"
-        if not file.exists() or file.read_text(encoding="utf-8") != text:
-            file.write_text(text, encoding="utf-8")
+                lines.append(f"| {_link(code)} | {middle} | {_some(tests)} |")
+        _write(folder / f"{name}.inc", lines, root)
     lines = ["| place | what it says | codes | functions | tests |", "|---|---|---|---|---|"]
     for one in statements(root):
-        codes = " ".join(f"[{code}](../theory.md#code-{code.lower()})" for code in one.codes)
+        codes = " ".join(map(_link, one.codes))
         held = [_some(list(one.functions)) or one.reason, _some(list(one.tests)) or one.reason]
         lines.append(
             f"| {one.text} {one.place} | {one.says.replace('|', chr(92) + '|')} | {codes} | {held[0]} | {held[1]} |"
         )
-    file, text = folder / "statements.inc", "\n".join(lines) + "\n"
+    _write(folder / "statements.inc", lines, root)
+
+
+def _link(code: str) -> str:
+    return f"[{code}](../theory.md#code-{code.lower()}){{.text-nowrap}}"
+
+
+def _write(file: Path, lines: list[str], root: Path) -> None:
+    """Write a table whose functions are links, if it changed."""
+    text = with_names("\n".join(lines) + "\n", places(root / "docs" / "reference"))
     if not file.exists() or file.read_text(encoding="utf-8") != text:
         file.write_text(text, encoding="utf-8")

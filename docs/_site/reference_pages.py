@@ -10,6 +10,7 @@ import tomllib
 import types
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,23 @@ def _line(found: Any) -> tuple[str, int]:
 def _definitions(file: str) -> dict[str, int]:
     tree = ast.parse(Path(file).read_text(encoding="utf-8"))
     return {node.name: node.lineno for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+
+
+def constant_documentation(name: str) -> list[str]:
+    """What stands below the definition of a constant in another module than that of its name, where autodoc looks."""
+    face, _, short = name.rpartition(".")
+    for key, module in sorted(sys.modules.items()):
+        file = getattr(module, "__file__", None)
+        if key.startswith(f"{face}.") and file and hasattr(module, short):
+            for node, below in pairwise(ast.parse(Path(file).read_text(encoding="utf-8")).body):
+                if short in _assigned(node) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+                    return inspect.cleandoc(str(below.value.value)).split("\n")
+    return []
+
+
+def _assigned(node: ast.stmt) -> list[str]:
+    targets = [node.target] if isinstance(node, ast.AnnAssign) else getattr(node, "targets", [])
+    return [target.id for target in targets if isinstance(target, ast.Name)]
 
 
 def _directive(found: Any) -> str:

@@ -166,7 +166,7 @@ class TrajectoryError(ShapePhaseError, ValueError):
 
 
 class UnknownColumnError(UnknownNameError, TrajectoryError):
-    """A column of a motion file that is no joint of the body.
+    """A column of a motion file that matches no joint of the body.
 
     Remedy: the message names the column, the joints and the nearest; `names={column: joint}` maps a column to a joint,
     or to None to leave it out.

@@ -36,7 +36,7 @@ def safe_newton(
     Raises
     ------
     AccuracyNotReached
-        If the bracket has not closed after 120 steps, which a function that is no number causes.
+        If the bracket has not closed after 120 steps, which a function that is not a number causes.
     """
     x, low, high = np.clip(start, low, high), low.copy(), high.copy()
     last = high - low

@@ -1,4 +1,7 @@
-"""Every figure as a panel beside another one: nothing is cut, and nothing stands on the other panel or on a legend."""
+"""Every figure as a panel beside another one: nothing is cut, and nothing stands on the other panel or on a legend.
+
+Nor is anything cut in the image of a notebook, which is cropped to what counts for the layout.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,9 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
+from matplotlib import rcParams
 from matplotlib.figure import Figure
+from matplotlib.transforms import TransformedBbox
 
 import shapephase as sp
 from shapephase import plots
@@ -121,11 +126,12 @@ def faults(figure, panels):
     """What is cut, and what covers what it should not."""
     found = []
     words = [words_of(panel) for panel in panels]
-    page = figure.bbox
+    cropped = figure.get_tightbbox().padded(rcParams["savefig.pad_inches"])
+    pages = {"": figure.bbox, " in a notebook": TransformedBbox(cropped, figure.dpi_scale_trans)}
     for own in words:
-        for name, box in own:
+        for (name, box), (where, page) in product(own, pages.items()):
             if np.any(box.min < page.min - PIXEL) or np.any(box.max > page.max + PIXEL):
-                found.append(f"{name} is cut")
+                found.append(f"{name} is cut{where}")
     for (panel, own), (other_panel, other) in combinations(zip(panels, words), 2):
         for mine, theirs, frames in ((own, other, other_panel), (other, own, panel)):
             for name, box in mine:
@@ -164,6 +170,7 @@ def legend_on_a_sphere(ax):
     [
         (legend_in_the_margin, "legend is on the other panel"),
         (legend_in_the_margin, "legend is cut"),
+        (legend_in_the_margin, "legend is cut in a notebook"),
         (legend_on_a_sphere, "the legend is on the picture"),
     ],
 )

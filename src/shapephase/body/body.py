@@ -79,7 +79,7 @@ class Body(ShapeArguments):
 
     Attributes
     ----------
-    name : str
+    name : of the body
     sha256, file : of the file it was loaded from, and where that was; None without a file
     packages : folders that were searched for the packages that the file names
     xacro_args : the arguments that its xacro file was expanded with
@@ -206,6 +206,8 @@ class Body(ShapeArguments):
         ------
         UnknownNameError
             If a name is not one of `joint_names`.
+        ShapeError
+            If a coordinate is not one number, or that of a ball joint not four.
         """
         if joints is not None and not isinstance(joints, Mapping):
             raise ShapeError(f"joints by name are needed, a mapping such as {{'elbow': 0.3}}, got {value_text(joints)}")
@@ -261,7 +263,11 @@ class Body(ShapeArguments):
     def with_frame_inertias(self, masses: Array, centres: Array, tensors: Array) -> Body:
         """The body with other inertias of all frames of its chain, in their axes, unchecked.
 
-        masses, centres, tensors : (k + 1,), (k + 1, 3), (k + 1, 3, 3)
+        Parameters
+        ----------
+        masses : (k + 1,) [kg]
+        centres : (k + 1, 3) centres of mass [m]
+        tensors : (k + 1, 3, 3) about them [kg m^2]
         """
         changed = copy(self)
         # The model has no frames between the three axes of a ball joint.
@@ -292,6 +298,8 @@ class Body(ShapeArguments):
             For an unknown joint.
         ModelFileError
             If joints follow each other in a circle, or one that the body does not have.
+        ShapeError
+            If a value is not a `Coupling`.
 
         Examples
         --------
@@ -538,6 +546,11 @@ class Body(ShapeArguments):
         -------
         correlation, its rate : (..., 3, 3) integral of r r_reference^T dm, each r from its own centre of mass, base
             axes [kg m^2], [kg m^2/s]
+
+        Raises
+        ------
+        ShapeError
+            If the reference is not one shape.
         """
         r, v = self._pair(shape, rate)
         still = self._checked(reference, "reference")

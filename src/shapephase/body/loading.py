@@ -71,7 +71,7 @@ def load_body(
         the file has several trees
     packages : folders that are searched for the packages of a URDF or a xacro file, `package://NAME`, `$(find NAME)`,
         before those around the file
-    xacro_args : values of the arguments of a xacro file by name, as {"payload": "true"}
+    xacro_args : values of the arguments of a xacro file by name, as `{"payload": "true"}`
     length_unit : the metres of a unit of a BVH file, which states none: 0.01 for centimetres
     person_mass : mass of the human made from the skeleton of a BVH or MVNX file [kg]; None: 70 kg, with a warning
 

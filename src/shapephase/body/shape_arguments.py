@@ -40,10 +40,16 @@ class ShapeArguments:
     def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
         """Angular momentum of a change of shape about the centre of mass with the base at rest.
 
+        Parameters
+        ----------
         shape, rate : (..., n) [rad or m], [rad/s or m/s]; leading axes broadcast
 
-        Returns (..., 3) base axes [kg m^2/s]
+        Returns
+        -------
+        (..., 3) base axes [kg m^2/s]
 
+        Notes
+        -----
         Raises like `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
         """
         r, v = self._checked(shape), self._checked(rate, "rate")

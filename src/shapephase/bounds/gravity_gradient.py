@@ -305,6 +305,8 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
     ------
     AccuracyNotReached
         If the estimate would take too many steps.
+    ShapeError
+        For a batch of motions.
 
     Examples
     --------

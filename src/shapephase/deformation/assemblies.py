@@ -62,7 +62,7 @@ class AssemblyDescription(UngaugedDescription):
 
     @property
     def mass(self) -> float:
-        """[kg]."""
+        """Mass [kg]."""
         return sum(part.mass for part in self.parts)
 
     def about_centre(self, times: Array) -> Moments:
@@ -275,6 +275,8 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
         If the paths last differently, or no part has a duration.
     SingularInertiaError
         If all mass is on one line at some time, which the message names.
+    WrongObjectError
+        If a part is not by these functions.
 
     Notes
     -----

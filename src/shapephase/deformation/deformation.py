@@ -142,7 +142,7 @@ class Deformation:
         """Part of L_o that wheels hold whatever the joints do: times (...) -> (..., 3), base axes [kg m^2/s].
 
         Zero without wheels. A wheel that keeps its momentum p about its axle a stores p a, one at a held speed J s a.
-        It is no rate of the shape: what it turns the body by grows with the time that a motion takes, and is no part
+        It is not a rate of the shape: what it turns the body by grows with the time that a motion takes, and is no part
         of the holonomy.
         """
         times = times_argument(t, self.duration)
@@ -180,6 +180,8 @@ class Deformation:
         ------
         GaugeError
             If only the inertia is known, not the masses (`prescribed`, or a motion read from a file).
+        ShapeError
+            If `angular_velocity` has another shape.
 
         Notes
         -----

@@ -79,7 +79,7 @@ def in_gauge(
     Warns
     -----
     UndeclaredBreakWarning
-        For kinks that are no breaks of the deformation; they are taken as breaks.
+        For kinks that are not breaks of the deformation; they are taken as breaks.
 
     Notes
     -----

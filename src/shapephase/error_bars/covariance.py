@@ -163,7 +163,7 @@ def uncertainty(
     UnknownNameError
         For a link that the body does not have, or a joint that turns no wheel.
     TrajectoryError
-        For a text that is no amount.
+        For a text that is not an amount.
 
     Notes
     -----

@@ -60,7 +60,7 @@ class RecordedMomentum:
     by_rates : (6, 3 N) change of start and momentum by the recorded rates, base axes; zero without rates
     rate_noise : of each component of a recorded rate, given or as the fit leaves it [rad/s]; 0 without rates
     rate_residuals : (N, 3) from reconstructed to recorded rates less their bias, base axes [rad/s]; (0, 3) without
-    bias : (3,) constant part of the recorded rates that is no motion, base axes [rad/s]; zero where it is not fitted
+    bias : (3,) constant part of the recorded rates that is not motion, base axes [rad/s]; zero where it is not fitted
     bias_covariance : (3, 3) [rad^2/s^2]; None where the bias is not fitted, and taken for zero
     """
 
@@ -136,13 +136,13 @@ def momentum_from_recording(
         quaternions are read with w first, or as their inverse, or the rates once they are read in deg/s; or if by the
         rates the base turns over half a turn from one time to the next.
     AccuracyNotReached
-        If the fit does not settle: the recording is no free flight of this body, or too coarse; or if it does not tell
-        the axes, or the bias that is to be found.
+        If the fit does not settle: the recording is not a free flight of this body, or too coarse; or if it does not
+        determine the axes, or the bias that is to be found.
 
     Warns
     -----
     TrajectoryWarning
-        If the momentum changes: what is left over of the recording is no noise. Bars then hold the momentum at every
+        If the momentum changes: what is left over of the recording is not noise. Bars then hold the momentum at every
         time.
 
     Notes

@@ -255,7 +255,7 @@ def derivatives(motion: Motion) -> Derivatives:
     Raises
     ------
     WrongObjectError
-        If it is no motion of an articulated body.
+        If it is not a motion of an articulated body.
     ShapeError
         If the motion is a batch.
 

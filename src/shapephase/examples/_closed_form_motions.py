@@ -157,6 +157,11 @@ class Scale:
 def pulsation(amount: float = 0.5, period: float = 3.0) -> Scale:
     """a^-2 = 1 + amount sin(2 pi t/period), 0 < |amount| < 1: tau = t + amount period (1 − cos)/(2 pi).
 
+    Raises
+    ------
+    ShapeError
+        If the amount is not between -1 and 1, or is 0.
+
     Examples
     --------
     >>> print(f"{sp.examples.pulsation(0.5, 3.0).clock(np.array(3.0)):.9f}")  # after a period the time itself

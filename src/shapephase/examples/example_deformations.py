@@ -223,6 +223,11 @@ def printed_antenna(
     extension_time, coast : how long the moment grows, and how long the body is then rigid [s]
     on_unphysical : as for `prescribed`
 
+    Raises
+    ------
+    ShapeError
+        For another axis, or if the moment does not grow.
+
     Notes
     -----
     Source: Cabrera 2006, example 4.5; theory.md F3, F4, C-E13.
@@ -294,6 +299,11 @@ def dipole_antenna(
     reach : distance of each tip mass from the centre at the end [m]
     extension_time, coast : as for `printed_antenna` [s]
 
+    Raises
+    ------
+    ShapeError
+        For another axis.
+
     Notes
     -----
     Source: theory.md F4b, C-E13.
@@ -364,7 +374,7 @@ def furniture(
 def cat(halves: bool = False) -> Example:
     """F7: the cat rights itself at zero momentum, by 180 degrees: a realistic one, or Kane and Scher's (`halves`).
 
-    Source: Kane and Scher 1969; `scenarios.kane_scher`, `scenarios.cat_righting`; theory.md F7 and section 7.
+    Source: Kane and Scher 1969; `kane_scher`, `cat_righting`; theory.md F7 and section 7.
 
     Examples
     --------
@@ -384,7 +394,7 @@ def cat(halves: bool = False) -> Example:
 def astronaut(legs: bool = False) -> Example:
     """F8: the astronaut pitches at zero momentum, 11.825049 degrees by circling the arms, 12.352775 by the legs.
 
-    Source: `scenarios.astronaut_arm_circles`, `scenarios.astronaut_leg_swing`; theory.md F8.
+    Source: `astronaut_arm_circles`, `astronaut_leg_swing`; theory.md F8.
 
     Examples
     --------
@@ -403,6 +413,11 @@ def rigid_body(moments: ArrayLike = (1.0, 1.5, 2.0), momentum: ArrayLike = (0.6,
     """F9: a rigid body over one period of Pi, known in closed form; its phase is Montgomery's.
 
     Source: Cabrera 2006, examples 2.6 and 3.8; theory.md F9, D12, D17.
+
+    Raises
+    ------
+    TrajectoryError
+        If the momentum does not come back, so that there is no period.
 
     Examples
     --------
@@ -434,6 +449,13 @@ EXAMPLES: Mapping[str, Callable[[], Example]] = {
     "astronaut": astronaut,
     "rigid_body": rigid_body,
 }
+"""Examples of the theory by name; a call makes one with its default parameters.
+
+Examples
+--------
+>>> sp.examples.EXAMPLES["furniture"]().deformation.duration
+20.0
+"""
 
 
 def linked_pentagon() -> ParticleBody:

@@ -70,6 +70,11 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0, *, body: str = 
     duration : of one loop [s]
     body : whose waist it is, "cat_two_halves" or "cat_untwisted", whose angles are singular at no bend
 
+    Raises
+    ------
+    TrajectoryError
+        If the angles are outside these limits.
+
     Notes
     -----
     Equation :eq:`kane-scher` of the documentation.
@@ -328,6 +333,13 @@ MOTIONS: Mapping[str, NamedMotion] = {
         "diver", five_stage_dive, "1.5 somersaults with a twist, into the plane again, momentum 0 57.735688525 0"
     ),
 }
+"""Motions that come with the library, by name: functions and commands take such a name in place of a path.
+
+Examples
+--------
+>>> sp.examples.MOTIONS["satellite_sweep"].body
+'satellite'
+"""
 
 
 def named_motion(name: str, body: Body | ParticleBody | str | None = None) -> ShapePath:

@@ -109,6 +109,10 @@ def export_motion(
     ------
     MissingExtraError
         Without xarray, pyarrow, h5py or rosbags, for the formats that need them.
+    UnknownNameError
+        For another ending.
+    ShapeError
+        If `.mcap` is to have `links` or `mrp`.
 
     Examples
     --------

@@ -37,6 +37,7 @@ class ForcedSplit:
     R the attitude of the gauge's frame,
 
         G_m R(T) G_u^T = exp(phase hat(m(0))) R(0),
+
         phase = dynamic_phase - body_solid_angle + space_solid_angle (mod 2 pi).
 
     Attributes

@@ -47,10 +47,13 @@ class PhaseSplit:
     All rotations are in inertial axes; fields have the motion's batch axes in front. With mu the unit vector of
     the momentum (where there is some), seen from the gauge's frame,
 
-        exp(montgomery_phase hat(mu)) closing_tilt = dynamical_rotation    in the horizontal gauge,
-        exp(montgomery_phase hat(mu)) closing_tilt = total_rotation        in the base gauge of a closed joint path,
-        total_rotation = dynamical_rotation holonomy                       always,
-        dynamical_rotation = momentum_rotation wheel_rotation              always.
+        exp(montgomery_phase hat(mu)) closing_tilt = dynamical_rotation in the horizontal gauge,
+
+        exp(montgomery_phase hat(mu)) closing_tilt = total_rotation in the base gauge of a closed joint path,
+
+        total_rotation = dynamical_rotation holonomy always,
+
+        dynamical_rotation = momentum_rotation wheel_rotation always.
 
     Attributes
     ----------

@@ -87,6 +87,11 @@ def square_cat_turn(near: ArrayLike, far: ArrayLike, angle: ArrayLike) -> Array:
     near, far : (...) arms, over those of the first cross [1]
     angle : (...) of the second cross on the first [rad]
 
+    Raises
+    ------
+    ShapeError
+        If an arm is below 0.
+
     Examples
     --------
     >>> print(f"{np.degrees(sp.planar.square_cat_turn(1.0, 2.0, np.pi / 2)):.6f} degrees")
@@ -117,6 +122,11 @@ def three_body_turn(masses: ArrayLike, positions: ArrayLike) -> float:
     Returns
     -------
     [rad] about the normal; of a loop of triangles that come back up to a turn
+
+    Raises
+    ------
+    ShapeError
+        If a mass is not above 0, there are fewer than three triangles, or all bodies are in one place.
 
     Examples
     --------
@@ -153,7 +163,7 @@ def yo_yo_rate(hub: float, mass: float, radius: float, length: ArrayLike, rate: 
     Parameters
     ----------
     hub : its moment of inertia [kg m^2]
-    mass : of both ends [kg]
+    mass : of both ends together [kg]
     radius : of the hub, at which the ends rest before [m]
     length : (...) of each free cord, still along a tangent [m]
     rate : of the hub before [rad/s]

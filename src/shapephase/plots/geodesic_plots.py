@@ -57,6 +57,11 @@ def plot_conjugate_locus(
         largest [sqrt(kg) m]
     geodesics : how many are drawn to either side
 
+    Raises
+    ------
+    ShapeError
+        If a momentum is not above the root of the middle moment.
+
     Notes
     -----
     Source: Bonnard, Cots and Shcherbakova 2013, section 4.4; theory.md R12.
@@ -128,6 +133,11 @@ def plot_surface_locus(
     latitude : of the start, as a length along the meridian, inside the surface
     geodesics : how many are drawn
 
+    Raises
+    ------
+    ShapeError
+        For a sphere, or if there are no orders.
+
     Notes
     -----
     Source: Bonnard, Cots and Shcherbakova 2013, section 2; theory.md O16, P3, P5, P6.
@@ -182,6 +192,11 @@ def plot_potential(ax: Axes, surface: SurfaceOfRevolution | ArrayLike, momenta: 
     ax : flat axes
     surface : a surface of revolution; or (3,) three different moments [kg m^2], of whose Serret-Andoyer metric
     momenta : (N,) Clairaut's p, in absolute value at most that of the equator; None: four, the separatrix among them
+
+    Raises
+    ------
+    ShapeError
+        If a momentum is larger than that of the equator.
 
     Notes
     -----

@@ -161,6 +161,13 @@ FIGURES: Mapping[str, Figure] = {
         in_report=False,
     ),
 }
+"""Figures of a motion by name, as `Motion.plot`, `report` and the command line take them.
+
+Examples
+--------
+>>> sp.plots.FIGURES["phases"].height  # [in]
+2.8
+"""
 RIGID_FIGURES: Mapping[str, tuple[float, Callable[[Axes, EulerTop, float], object]]] = {
     "polhodes": (3.8, lambda ax, top, _: plot_polhodes(ax, top)),
     "herpolhode": (3.8, lambda ax, top, _: plot_herpolhode(ax, top)),

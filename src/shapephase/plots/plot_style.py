@@ -79,11 +79,16 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     height : [in]
     projection : None: flat; "3d"
 
+    Raises
+    ------
+    ShapeError
+        If the height is not above 0.
+    MissingExtraError
+        If Matplotlib is not installed.
+
     Notes
     -----
     The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it.
-
-    Raises MissingExtraError.
 
     Examples
     --------
@@ -256,6 +261,8 @@ def finish_below(ax: Any, **place: Any) -> Any:
     legend = finish(ax, loc="lower center", borderaxespad=0.0, **place)
     # A legend wider than the axes would make the layout shrink them.
     legend.set_in_layout(False)
+    # A notebook would crop the image to the axes: the figure's own patch keeps all of it.
+    ax.figure.patch.set_in_layout(True)
     width, height = panel_size(ax)
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     needed = _LEGEND_GAP + _extent(legend).height / ax.figure.dpi

@@ -95,6 +95,13 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
     ----------
     bounds : from `bounds.bounds`
 
+    Raises
+    ------
+    WrongObjectError
+        For anything but bounds.
+    ShapeError
+        If there are none.
+
     Examples
     --------
     >>> ax = sp.plots.column_axes()

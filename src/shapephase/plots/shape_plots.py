@@ -54,6 +54,11 @@ def plot_shape_path(
         are grey
     times : (N,) where to draw [s]; None: evenly between the breaks
 
+    Raises
+    ------
+    ShapeError
+        If there are no joints to draw, or `joints` is not a list.
+
     Examples
     --------
     >>> ax = sp.plots.column_axes()
@@ -197,6 +202,11 @@ def plot_reach(ax: Axes, found: Reach, count: int = 10) -> Axes:
     ax : flat axes
     found : what `reachable` gives
     count : of pairs, 1 or more
+
+    Raises
+    ------
+    ShapeError
+        If the body has no pair of joints.
 
     Examples
     --------

@@ -468,6 +468,8 @@ def reconstruct(
         For more than 400,000 intervals between breaks in one loop (a recording has one between samples).
     RunStopped
         If `progress` stopped the run.
+    WrongObjectError
+        If no momentum is given.
 
     Notes
     -----

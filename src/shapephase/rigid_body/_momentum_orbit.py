@@ -166,6 +166,11 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     moments : (3,) in any order, above 0, not all equal [kg m^2]
     axis : 0, 1 or 2, one of these axes, with the smallest or the largest moment
 
+    Raises
+    ------
+    ShapeError
+        If the moments are all equal, or the axis is that of the middle one.
+
     Examples
     --------
     >>> areas = [sp.rigid_body.separatrix_solid_angle([1.0, 2.0, 3.0], axis) for axis in (0, 2)]

@@ -93,6 +93,11 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     momentum : (3,) body momentum at t = 0 [kg m^2/s]
     gamma : (3,) upward vertical in body axes at t = 0
 
+    Raises
+    ------
+    ShapeError
+        If Mgl is not above 0.
+
     Examples
     --------
     >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)

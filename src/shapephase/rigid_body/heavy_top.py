@@ -38,7 +38,7 @@ class HeavyTop:
 
     Equation :eq:`heavy-top` of the documentation.
     Source: Marsden and Ratiu (15.10.1-3).
-    Raises ShapeError if shapes or entries are wrong, or chi is no unit vector (to 1e-6).
+    Raises ShapeError if shapes or entries are wrong, or chi is not a unit vector (to 1e-6).
 
     Parameters
     ----------
@@ -134,8 +134,7 @@ class HeavyTop:
         The attitude is integrated as a quaternion, together with the two horizontal components of the spatial momentum
         R Pi; its vertical component, Pi.Gamma, is constant and enters as given. Gamma = R^T e_z and Pi = R^T (R Pi) are
         formed from these, so Pi.Gamma and |Gamma| cannot drift. The method is Dormand and Prince's of order 8(5,3); a
-        second run with a looser tolerance gives the error estimate. Raises AccuracyNotReached if the tolerance cannot
-        be met: unstable or chaotic motions magnify rounding exponentially.
+        second run with a looser tolerance gives the error estimate.
 
         Parameters
         ----------
@@ -145,6 +144,13 @@ class HeavyTop:
         attitude : (..., 3, 3) body to inertial axes at the start, instead of gamma; with neither, the identity
         duration : of the motion [s]
         tolerance : of the attitude over the whole motion, in [1e-12, 1e-2] [rad]
+
+        Raises
+        ------
+        ShapeError
+            If both gamma and attitude are given, or the tolerance is outside its limits.
+        AccuracyNotReached
+            If the tolerance cannot be met: unstable or chaotic motions magnify rounding exponentially.
         """
         body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         if gamma is not None and attitude is not None:

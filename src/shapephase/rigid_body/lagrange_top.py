@@ -332,7 +332,6 @@ def stability_chart(
     sqrt(1 - Pi_3^2/4), and long durations are needed.
 
     Source: Marsden and Ratiu, theorem 15.10.1; theory.md M8.
-    Raises AccuracyNotReached if the simulation needs more than 200 000 steps.
 
     Parameters
     ----------
@@ -340,6 +339,13 @@ def stability_chart(
     momenta : (P,) Pi_3/sqrt(Mgl I1)
     tilt : at the start, in (0, 0.01] [rad]
     duration : of the simulation [sqrt(I1/Mgl)]
+
+    Raises
+    ------
+    ShapeError
+        If the ratios or momenta are not lists, or tilt and duration are outside their limits.
+    AccuracyNotReached
+        If the simulation needs more than 200 000 steps.
 
     Examples
     --------

@@ -104,6 +104,8 @@ class PseudoRigidBody:
         ------
         AccuracyNotReached
             If the motion takes too many steps.
+        ShapeError
+            If the matrices have other shapes.
 
         Examples
         --------

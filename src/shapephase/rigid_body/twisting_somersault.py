@@ -181,8 +181,6 @@ def rotor_dive(
     duration. `rotor_dive_lasting` finds the momentum for a duration.
 
     Source: Bharadwaj et al. 2016; Cabrera 2006 (13); theory.md F10.
-    Raises TrajectoryError if there is no such dive: after the first shape change the momentum does not circle the long
-    axis, or has circled it too far already, or shape changes and twist alone are more somersaults.
 
     Parameters
     ----------
@@ -192,6 +190,14 @@ def rotor_dive(
     kick : time for which the rotor is on, twice [s]
     somersaults : m > 0
     twists : n, a positive multiple of a half
+
+    Raises
+    ------
+    ShapeError
+        If the twists are not a multiple of a half, or the rotor is 0 or more than one number.
+    TrajectoryError
+        If there is no such dive: after the first shape change the momentum does not circle the long axis, or has
+        circled it too far already, or shape changes and twist alone are more somersaults.
 
     Examples
     --------

@@ -256,7 +256,7 @@ def contributions(
     motion : made by `reconstruct` of `articulated(body, path)`
     of : "twist" or "somersault" (counts, followed in time), "tilt" (at the time `at`), "rotation" (turn about `about`),
         "phase" (Montgomery's, horizontal gauge), or a function of a Motion that returns a number
-    groups : "limbs", "joints", or patterns of joint names by group, {"arms": ["left_*", "right_*"]}; where another
+    groups : "limbs", "joints", or patterns of joint names by group, `{"arms": ["left_*", "right_*"]}`; where another
         motion is the baseline also "momentum", "attitude", "duration" and "body", with an empty pattern. What wheels
         store is the group "wheels" of the first two, and with an empty pattern beside others; without it they store
         nothing, or as much as in the other motion

@@ -80,6 +80,8 @@ def clearance(
         If the body has no shapes.
     TrajectoryError, UnknownNameError
         If the path does not fit the body.
+    ShapeError
+        If `below` is not a number.
 
     Notes
     -----

@@ -165,7 +165,7 @@ class HorizontalLift:
 
     Attributes
     ----------
-    body : who moves
+    body : the one that moves
     path : how the joints move, in the body's order
     solution : the integrated rotation
     """
@@ -176,7 +176,7 @@ class HorizontalLift:
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Duration [s]."""
         return self.path.duration
 
     @property

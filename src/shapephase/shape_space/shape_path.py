@@ -247,6 +247,8 @@ class ShapePath:
         ------
         TrajectoryError
             If the rates are not the derivatives of the shapes (checked at a few times, and again by the scan).
+        ShapeError
+            If the function returns another shape than (N, n).
         """
         check_function(f, "f", "a function of times that gives shapes and rates")
         period = positive_argument(duration)
@@ -392,6 +394,8 @@ class ShapePath:
         ------
         OpenPathError
             If the path does not end where it begins, up to whole turns of joints, and signs of quaternions.
+        TrajectoryError
+            If the count is not a whole number of 1 or more.
         """
         if not isinstance(count, int | float | np.number) or not np.isfinite(count) or count < 1 or count % 1:
             raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {value_text(count)}")

@@ -113,7 +113,13 @@ class StudyStore:
         return sorted(listed, key=lambda complaint: -complaint[0])
 
     def dataset(self) -> Any:
-        """Return an `xarray.Dataset` along the dimensions of the grids, and of the draws where there are more."""
+        """Return an `xarray.Dataset` along the dimensions of the grids, and of the draws where there are more.
+
+        Raises
+        ------
+        MissingExtraError
+            Without xarray.
+        """
         try:
             import xarray
         except ImportError:

@@ -60,9 +60,9 @@ class Study(CaseTable):
         compared by their code and all that it refers to when the study is resumed
     root, root_body, packages, xacro_args, on_unphysical : how the bodies' files are read, as for `load_body`
     length_unit, person_mass : of the bodies' BVH files, as for `load_body` [m, kg]
-    recording : arguments of `read_recorded_motion` for motions from files, {"flight": "all"}, and those of one file by
-        its name, {"a.csv": {"flight": (0.2, 1.1)}}; momentum and attitude are then fitted to the base of each file, as
-        `motion_from_recording` does; None: the momentum is as given
+    recording : arguments of `read_recorded_motion` for motions from files, `{"flight": "all"}`, and those of one file
+        by its name, `{"a.csv": {"flight": (0.2, 1.1)}}`; momentum and attitude are then fitted to the base of each
+        file, as `motion_from_recording` does; None: the momentum is as given
 
     Raises
     ------
@@ -115,6 +115,8 @@ class Study(CaseTable):
             Without Zarr.
         RunStopped
             If `progress` stopped it.
+        StudyError
+            If `workers` is not a whole number of 0 or more, is given beside a client, or is 0 with a time limit.
         """
         check_file_name(store, "store")
         check_flag(resume, "resume")

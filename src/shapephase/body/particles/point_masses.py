@@ -71,7 +71,7 @@ class ParticleBody(ShapeArguments):
 
     @property
     def mass(self) -> float:
-        """[kg]."""
+        """Mass [kg]."""
         return float(self.masses.sum())
 
     sha256 = None  # it comes from no file
@@ -88,7 +88,10 @@ class ParticleBody(ShapeArguments):
         """Largest rates: (n,), infinite."""
         return np.full(self.n_shape, np.inf)
 
-    effort_limits = rate_limits
+    @property
+    def effort_limits(self) -> Array:
+        """Largest forces and torques: (n,), infinite."""
+        return self.rate_limits
 
     def joint_columns(self, names: Iterable[str]) -> list[int]:
         """Places of parameters in the shape vector, in ascending order. Raises UnknownNameError."""
@@ -221,6 +224,8 @@ def particle_body(
         places.
     WrongObjectError
         If `places` cannot be called.
+    UnknownNameError
+        If `continuous` or `limits` names another parameter.
 
     Notes
     -----

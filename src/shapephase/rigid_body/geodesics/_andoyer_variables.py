@@ -241,6 +241,10 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     ------
     AccuracyNotReached
         If the attitude jumps, or turns so often between the times that it cannot be followed.
+    WrongObjectError
+        If the motion has no `attitude` or `body_momentum`.
+    ShapeError
+        If the times are not in strict order.
 
     Examples
     --------

@@ -214,8 +214,8 @@ class CutLocus:
 def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
     """The cut locus of the point at a latitude, longitude 0.
 
-    Raises ShapeError if the surface is no smooth sphere whose curvature changes one way from the equator to the poles,
-    or whose first return falls with p, or the point is a pole.
+    Raises ShapeError if the surface is not a smooth sphere whose curvature changes one way from the equator to the
+    poles, or whose first return falls with p, or the point is a pole.
 
     Examples
     --------

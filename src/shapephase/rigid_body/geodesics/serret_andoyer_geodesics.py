@@ -226,8 +226,8 @@ class GeodesicFamily:
         tends to phi = -K/alpha, theta infinite, as p falls to sqrt(I_2).
 
         Source: Bonnard et al., section 4.4; theory.md R12.
-        Raises ShapeError if the order is no such number, or a geodesic does not oscillate: the others have no conjugate
-        point (theory.md R13).
+        Raises ShapeError if the order is not such a number, or a geodesic does not oscillate: the others have no
+        conjugate point (theory.md R13).
         """
         order = whole_argument(order, "order", 1)
         a3 = float(1.0 / self.constants.moments[2])

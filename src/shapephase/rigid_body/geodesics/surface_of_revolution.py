@@ -303,9 +303,7 @@ def _trend(rates: Array, rounding: float) -> str:
 def surface_of_stretch(
     stretch: Stretch, equator: float, depth: float, end: str = "pole", closed_arcs: ClosedArcs | None = None
 ) -> SurfaceOfRevolution:
-    """A surface by its stretch D(Y), see the module.
-
-    Raises AccuracyNotReached if D is too rough for the quadrature to settle.
+    """A surface by its stretch D(Y) = (d phi/dy) sqrt(1 - Y) with y^2 = Y = 1 - m(phi)/m(0); D = 1 on the unit sphere.
 
     Parameters
     ----------
@@ -315,6 +313,13 @@ def surface_of_stretch(
     depth : Y at the reach; 1 for a pole
     end : "pole", "parallel" or "boundary"
     closed_arcs : the integrals along extremals in closed form, where known
+
+    Raises
+    ------
+    ShapeError
+        If `end` and `depth` do not belong to each other, or D is not positive.
+    AccuracyNotReached
+        If D is too rough for the quadrature to settle.
 
     Examples
     --------

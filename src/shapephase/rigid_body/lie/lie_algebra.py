@@ -117,8 +117,12 @@ class LieAlgebra:
     def coordinates(self, matrix: ArrayLike) -> Array:
         """The components of a matrix of the algebra, the inverse of `matrix`: (..., n, n) -> (..., d).
 
-        Raises LieAlgebraError if the matrix is further from the span of the basis than 1e-9 of its largest entry, or
-        there is no basis.
+        Raises
+        ------
+        ShapeError
+            If the matrices have another size than the basis.
+        LieAlgebraError
+            If a matrix is further from the span of the basis than 1e-9 of its largest entry, or there is no basis.
         """
         basis = self.matrix_basis
         matrices = _matrices(matrix, "matrix")
@@ -150,11 +154,16 @@ class LieAlgebra:
 def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra") -> LieAlgebra:
     """The Lie algebra spanned over the reals by matrices, the bracket being AB - BA.
 
-    Raises LieAlgebraError if the matrices are linearly dependent, or a bracket leaves their span.
-
     Parameters
     ----------
     basis : (d, n, n) real or complex matrices, linearly independent and closed under the bracket
+
+    Raises
+    ------
+    ShapeError
+        If the matrices have another shape, or there are none.
+    LieAlgebraError
+        If the matrices are linearly dependent, or a bracket leaves their span.
 
     Examples
     --------

@@ -160,7 +160,7 @@ def read_table(file: str | os.PathLike[str], *, topic: str | None = None) -> pd.
 
     A text may have any separator, decimal commas, comments and a row of units, a header behind `#`, none at all, or
     the five rows of Vicon Nexus. Columns are labelled as the file labels them, or from 1 where it does not; the index
-    has the numbers of the rows in the file. Entries that are no numbers stay texts, empty ones are NaN.
+    has the numbers of the rows in the file. Entries that are not numbers stay texts, empty ones are NaN.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def read_table(file: str | os.PathLike[str], *, topic: str | None = None) -> pd.
     InputFileNotFoundError
         If there is no such file.
     TrajectoryError
-        For a row that is longer or shorter than the header, with its number, and for what is no table.
+        For a row that is longer or shorter than the header, with its number, and for what is not a table.
     UnknownNameError
         For an unknown ending, or a topic that is not there.
 

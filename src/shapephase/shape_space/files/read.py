@@ -191,7 +191,7 @@ def read_recorded_motion(file: Any, body: Body | str, **options: Unpack[ReadingO
     InputFileNotFoundError
         If there is no such file.
     UnknownNameError
-        If a column is no joint of the body, or the file's ending is unknown.
+        If a column matches no joint of the body, or the file's ending is unknown.
     TrajectoryError
         For any other fault of the file; row and column or joint are named. For a unit that can only be guessed; for a
         flight that falls by another acceleration than gravity, by more than a tenth of it and three error bars of its

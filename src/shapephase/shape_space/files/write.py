@@ -47,6 +47,8 @@ def write_shape_path(
         If the path has no joint names, times do not ascend, or a table of the path takes more than a million rows.
     UnknownNameError
         For an unknown ending of the file.
+    ShapeError
+        If the times are not one row.
 
     Warns
     -----

@@ -80,7 +80,7 @@ class MinimumPerturbation:
         Raises
         ------
         OpenPathError
-            For a path that is no loop.
+            For a path that is not a loop.
         AccuracyNotReached
             If the integral still changes, as where the joints go far beyond the region of the frame.
         """
