@@ -21,6 +21,8 @@ from typing import Any
 import nbformat
 from PIL import Image
 
+from shapephase.cli import main as command_line
+
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = ROOT / "notebooks"
 # The longest notebook plans a dozen motions; a busy machine takes minutes for it [s].
@@ -33,6 +35,8 @@ _SIZE = 1e-6
 # Most bytes of a picture, and of a page in three dimensions.
 MOST_OF_A_PICTURE = 100_000
 MOST_OF_A_PAGE = 300_000
+# Rounds that move the colours of a picture to the means of what they stand for; without, smooth maps have steps.
+_MEANS = 4
 _NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 _FRAME = re.compile(r'srcdoc="[^"]*"')
 _ADDRESS = re.compile(r" at 0x[0-9a-f]+")
@@ -56,11 +60,15 @@ def write(notebook: Any, path: Path) -> None:
 
 
 def quiet_kernels(folder: Path) -> None:
-    """Start kernels with settings of their own, not the user's; what they say of their transport is no warning."""
+    """Start kernels with settings of their own, not the user's, and without the log lines of their transport.
+
+    Loops are compiled before: on a machine where they are new, a log line of it would stand on the page that is first.
+    """
     profile = folder / "profile_default"
     profile.mkdir(parents=True, exist_ok=True)
     (profile / "ipython_kernel_config.py").write_text("get_config().Application.log_level = 40\n", encoding="utf-8")
     os.environ["IPYTHONDIR"] = str(folder)
+    command_line.main(["compile", "--quiet"])
 
 
 def execute(path: Path) -> Any:
@@ -122,7 +130,8 @@ def _light(picture: str) -> str:
     image, kept = Image.open(io.BytesIO(b64decode(picture))), io.BytesIO()
     if image.mode == "P":
         return picture
-    image.convert("RGB").quantize(256).save(kept, "png", optimize=True)
+    light = image.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, _MEANS, dither=Image.Dither.NONE)
+    light.save(kept, "png", optimize=True)
     return b64encode(kept.getvalue()).decode()
 
 
