@@ -23,7 +23,13 @@ HERE = Path(__file__).parent
 ROWS = {file.stem: file for file in sorted((HERE / "rows").iterdir())}
 # Pixels: a column of the page, and the window that a page is opened in.
 WIDTH = 442
-WINDOW = {"explore": (1000, 900), "rolling_page": (900, 760), "plan": (900, 760), "split": (900, 1300)}
+WINDOW = {
+    "explore": (1000, 900),
+    "rolling_page": (900, 760),
+    "plan": (900, 760),
+    "split": (900, 1300),
+    "audit": (900, 1030),
+}
 USUAL_WINDOW = (900, 1000)
 RESOLUTION = 260  # [dots per inch] that figures are drawn in, before they are made smaller
 WIDEST = 4.0  # [height] a film in pictures side by side is cut in two rows
