@@ -28,7 +28,7 @@ WINDOW = {
     "rolling_page": (900, 760),
     "plan": (900, 760),
     "split": (900, 1300),
-    "audit": (900, 1030),
+    "audit": (900, 1012),
 }
 USUAL_WINDOW = (900, 1000)
 RESOLUTION = 260  # [dots per inch] that figures are drawn in, before they are made smaller
