@@ -135,8 +135,8 @@ def print_cases(contestants: list[Contestant], numbers: list[int], turns: int) -
     all_cases = {number: numbered_case(number) for number in numbers}
     ways = [(c.name, way, asked) for c in contestants for way in ("known", "box") for asked in ("asked", "same error")]
     print(f"\ncompiled C++: {' '.join(FLAGS)}; tolerance {TOLERANCE:g} rad; processor time [ms]; ratios to C++\n")
-    heads = "".join(f"{c.name:>18.18}{'ratio':>7}{'same error':>11}{'evals':>7}" for c in contestants)
-    print(f"{'case':38}{'':7}{'C++':>8}{'to':>8}{'evals':>7}{heads}")
+    heads = "".join(f"{c.name:>8.8}{'ratio':>6}{'same error':>11}{'evals':>6}" for c in contestants)
+    print(f"{'case':38}{'':6}{'C++':>6}{'to':>6}{'evals':>6}{heads}")
     done: dict[int, Entries] = {}
     for number in numbers:
         done[number] = compared(all_cases[number], number, contestants, turns)
@@ -166,13 +166,13 @@ def print_medians(names: dict[int, str], done: dict[int, Entries], ways: list[tu
 
 def _row(case: Case, way: str, entries: Entries, contestants: list[Contestant]) -> str:
     peer = entries.get((_PEER, "", ""))
-    line = f"{case.name:38}{way:7}"
-    line += f"{peer.median:8.3f}{peer.tolerance:8.0e}{peer.evaluations:7d}" if peer else f"{'':23}"
+    line = f"{case.name:38}{way:6}"
+    line += f"{peer.median:6.3f}{peer.tolerance:6.0e}{peer.evaluations:6d}" if peer else f"{'':18}"
     for contestant in contestants:
         ours = entries[contestant.name, way, "asked"]
         eased = entries[contestant.name, way, "same error"]
         ratios = [_paired(entry, peer) if peer else np.nan for entry in (ours, eased)]
-        line += f"{ours.median:18.3f}{ratios[0]:7.2f}{ratios[1]:11.2f}{ours.evaluations:7d}"
+        line += f"{ours.median:8.3f}{ratios[0]:6.2f}{ratios[1]:11.2f}{ours.evaluations:6d}"
     return line
 
 
@@ -254,7 +254,7 @@ def _errors(
 def print_workloads(contestants: list[Contestant], numbers: list[int], *, quick: bool) -> None:
     """A line for each number of each workload, a column for each contestant."""
     turns, many, few, rows = (3, 2000, 100, 1000) if quick else (7, 10_000, 1000, 10_000)
-    print(f"\n{'':44}" + "".join(f"{c.name:>18.18}" for c in contestants))
+    print(f"\n{'':50}" + "".join(f"{c.name:>10.10}" for c in contestants))
     print_table("a black box for the first time", contestants, "first_black_boxes", numbers)
     print_table("after a reconstruction", contestants, "afterwards", turns, numbers)
     print_table("exact derivatives", contestants, "derivative_costs", turns)
@@ -275,14 +275,14 @@ def print_table(title: str, contestants: list[Contestant], workload: str, *argum
             faults.append(str(failed))
     print(title if any(columns) else f"{title}: not there", flush=True)
     for name in dict.fromkeys(name for column in columns for name in column):
-        cells = (_cell(column[name]) if name in column else f"{'':18}" for column in columns)
-        print(f"  {name:42}" + "".join(cells))
+        cells = (_cell(column[name]) if name in column else f"{'':10}" for column in columns)
+        print(f"  {name:48}" + "".join(cells))
     for fault in faults:
         print(f"  {fault}")
 
 
 def _cell(value: float) -> str:
-    return f"{value:18,.0f}" if abs(value) >= 1000.0 else f"{value:18.3g}"
+    return f"{value:10,.0f}" if abs(value) >= 1000.0 else f"{value:10.3g}"
 
 
 if __name__ == "__main__":

@@ -23,6 +23,8 @@ PAGE = ROOT / "docs" / "published.md"
 _BEGIN, _END = "<!-- results -->\n", "<!-- end of results -->\n"
 _MORE_DIGITS = 2
 """That a computed number is shown with, beyond those printed."""
+_NO_BREAK = "\N{NO-BREAK SPACE}"
+"""Between a number and its unit: J s in two lines would be J/s."""
 _SLACK = 1e-6
 """In parts of the last digit: a number that was rounded half up is not refused for the rounding of ours."""
 
@@ -398,9 +400,10 @@ def said_of(entry: Entry) -> str:
 def _row(entry: Entry, number: float) -> str:
     shown = f"{number:.{entry.digits + _MORE_DIGITS}f}" if entry.digits else f"{number:.0f}"
     printed = entry.published + (f" ± {entry.within}" if entry.within else "…" if entry.truncated else "")
+    gap = "" if entry.unit.startswith("°") else " "
     difference = f"{number - float(entry.published):z.{entry.digits + 1}f}" if entry.digits else "0"
-    unit = f" {entry.unit}" if entry.unit else ""
-    cells = (entry.what, printed + unit, shown + unit, difference)
+    quantities = [f"{value}{gap}{entry.unit}".strip().replace(" ", _NO_BREAK) for value in (printed, shown)]
+    cells = (entry.what, *quantities, difference)
     return f"| {' | '.join(cells)} |"
 
 

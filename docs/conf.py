@@ -107,6 +107,8 @@ html_static_path = ["_static", str(LIVE)]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
+# A page without others beside it has no list of them.
+html_sidebars = {"gallery": []}
 html_theme_options = {
     "navigation_with_keys": False,
     "secondary_sidebar_items": ["page-toc"],

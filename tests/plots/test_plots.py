@@ -9,6 +9,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 import shapephase as sp
@@ -1006,3 +1007,66 @@ def test_the_legend_of_reach_is_within_the_column_and_axes_differ_in_grey():
     assert box.x0 >= 0.0
     assert box.x1 <= ax.figure.canvas.get_width_height()[0]
     assert len({patch.get_hatch() for patch in ax.patches}) == len(ax.patches) == 3
+
+
+def test_energy_and_polhodes_have_the_same_colours():
+    """Blue about the largest moment, orange or vermilion about the smallest, separatrix black, the body's own green."""
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    ax = plots.plot_energy(flat_axes(2.6), motion)
+    sphere = plots.plot_polhodes(flat_axes(3.8), EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5]))
+    drawn = {line.get_label(): to_rgb(line.get_color()) for line in ax.lines}
+    legend = sphere.get_legend()
+    named = {text.get_text(): line for text, line in zip(legend.get_texts(), legend.legend_handles, strict=True)}
+    assert drawn["$E$"] == to_rgb(named["this top"].get_color())
+    assert drawn[r"$\ell^2\!/2I_2$, separatrix"] == to_rgb(named["separatrix"].get_color())
+    for band in ax.collections:
+        red, _, blue = band.get_facecolor()[0][:3]
+        line_red, _, line_blue = to_rgb(named[band.get_label()].get_color())
+        assert (red > blue) == (line_red > line_blue)
+
+
+def test_torques_and_forces_have_their_zeros_at_one_height(motions):
+    ax = plots.plot_torques(flat_axes(2.8), motions["satellite"])
+    left, right = (axes.get_ylim() for axes in ax.figure.axes)
+    assert left[0] / (left[1] - left[0]) == pytest.approx(right[0] / (right[1] - right[0]), rel=1e-12)
+    for axes in ax.figure.axes:
+        low, high = axes.get_ylim()
+        for line in axes.lines:
+            assert low < np.min(line.get_ydata()) <= np.max(line.get_ydata()) < high
+
+
+def test_an_axis_of_metres_has_a_joint_with_a_name():
+    """Of a satellite's nine joints the boom moves by 0.2 m, less than six others do in radians."""
+    body = sp.load_body("satellite")
+    far = {"boom_extension": 0.2, "wheel_spin": 0.0}
+    swing = [far.get(name, 1.0) for name in body.joint_names]
+    path = sp.ShapePath.waypoints([0.0, 1.0], [np.zeros(len(swing)), swing], joint_names=body.joint_names)
+    ax = plots.plot_shape_path(flat_axes(2.8), path, body)
+    named = [name for name in labels(ax) if not re.match(r"\d+ others|beyond a limit", name)]
+    assert len(named) == 6
+    assert "boom_extension [m]" in named
+
+
+def test_axes_that_share_their_ordinates_keep_the_numbers_of_radians(motions):
+    for ax in Figure(figsize=(8.0, 3.0), layout="constrained").subplots(1, 2, sharey=True):
+        plots.plot_phases(ax, motions["cat"])
+        ax.figure.draw_without_rendering()
+        assert any(tick.label2.get_visible() and tick.label2.get_text() for tick in ax.yaxis.get_major_ticks())
+
+
+def test_a_figure_cut_to_its_content_keeps_the_legend_below_a_sphere():
+    """Beside a flat figure the sphere is narrower than its legend."""
+    figure = Figure(figsize=(6.8, 3.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    top = EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    plots.plot_polhodes(left, top)
+    plots.plot_herpolhode(right, top, 4)
+    figure.draw_without_rendering()
+    kept = figure.get_tightbbox().padded(0.01)
+    for place in left.get_legend().get_window_extent().get_points() / figure.dpi:
+        assert kept.contains(*place)
+
+
+def test_lines_in_axes_of_a_column_have_the_colours_of_okabe_and_ito():
+    ax = plots.column_axes()
+    assert [line.get_color() for line in ax.plot(np.zeros((2, 3)))] == ["#0072B2", "#D55E00", "#009E73"]

@@ -12,5 +12,5 @@ def gravity(state):
 
 body = sp.rigid(np.diag([80.0, 110.0, 150.0]), 600.0)
 forced, ax = sp.reconstruct(body, start, torque=gravity), sp.plots.column_axes(2.6)
-ax.plot(t, forced.momentum(t) - start)
+ax.legend(ax.plot(t, forced.momentum(t) - start), "xyz", ncols=3, loc=(0, 1.02))
 ax.set(xlabel="$t$ [s]", ylabel="momentum gained [kg m²/s]")

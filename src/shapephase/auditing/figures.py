@@ -46,7 +46,7 @@ def audit_figure(found: Audit) -> Figure:
     ...     times=times, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (51, 1)), shapes=np.zeros((51, 3)))
     >>> figure = sp.auditing.audit_figure(sp.audit(cat, still))
     >>> [ax.get_ylabel() for ax in figure.axes]
-    ['momentum drift', 'attitude error [deg]']
+    ['momentum drift [1]', 'attitude error [deg]']
     """
     check_object(found, "Audit", "found")
     rows = 3 if found.hypotheses else 2
@@ -187,7 +187,7 @@ def _drift(ax: Axes, found: Audit) -> None:
         drift = np.linalg.norm(run.momentum - run.momentum.mean(axis=0), axis=1) / scale
         ax.plot(run.times, drift, label=_named(run.name, run.step, len(found.runs)), **style)
     ax.axhline(found.tolerance, color=GREY, linewidth=0.8, linestyle=":")
-    ax.set_ylabel("momentum drift")
+    ax.set_ylabel("momentum drift [1]")
     ax.set_yscale("log")
     if len(found.runs) > 1:
         ax.legend(fontsize=SMALL - 1, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=_A_ROW)

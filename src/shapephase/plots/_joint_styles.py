@@ -83,6 +83,13 @@ def joint_place(joint: str | int, names: Sequence[str]) -> int:
     raise unknown_name("joint", str(joint), names)
 
 
+def named_joints(joints: Sequence[int], units: Sequence[str]) -> list[int]:
+    """Those that a figure names: the first joint of each unit, and of the others the first, six in all."""
+    leaders = {units[k]: k for k in reversed(joints)}.values()
+    rest = [k for k in joints if k not in leaders]
+    return sorted([*leaders, *rest][:MAX_NAMED], key=list(joints).index)
+
+
 def plot_joints(
     places: dict[str, Any],
     times: Array,
@@ -92,14 +99,17 @@ def plot_joints(
     units: Sequence[str],
     shown_units: dict[str, str],
 ) -> dict[str, Any]:
-    """Draw columns of joints in time on the axes of their units: the first six by name, the others in grey.
+    """Draw columns of joints in time on the axes of their units: six by name, the others in grey.
+
+    Those are the first six, or fewer of them where a unit has its first joint later.
 
     Returns handles, labels and ncols of a legend, where units are shown if there are several.
     """
     handles: list[Any] = []
     texts: list[str] = []
     rows: list[int] = joints.tolist()
-    named, others = rows[:MAX_NAMED], rows[MAX_NAMED:]
+    named = named_joints(rows, units)
+    others = [k for k in rows if k not in named]
     for k, look in zip(named, joint_styles([names[k] for k in named]), strict=True):
         handles += places[units[k]].plot(times, values[:, k], **look)
         texts.append(plain_text(names[k]) + ("" if len(places) == 1 else f" [{shown_units[units[k]]}]"))

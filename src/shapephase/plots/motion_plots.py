@@ -264,8 +264,8 @@ def plot_energy(
     t = style.motion_times(motion, times)
     top, middle, bottom = (0.5 * magnitude * magnitude / np.linalg.eigvalsh(motion.deformation.inertia(t))).T
     bands: tuple[tuple[Array, Array, str, dict[str, Any]], ...] = (
-        (middle, top, "about smallest moment", {"facecolor": "#CBE5F5", "edgecolor": style.SKY}),
-        (bottom, middle, "about largest moment", {"facecolor": "#FBE8C8", "edgecolor": style.ORANGE, "hatch": "///"}),
+        (middle, top, "about smallest moment", {"facecolor": "#FBE8C8", "edgecolor": style.ORANGE, "hatch": "///"}),
+        (bottom, middle, "about largest moment", {"facecolor": "#CBE5F5", "edgecolor": style.SKY}),
     )
     for low, high, label, look in bands:
         if (high - low).max() > _NO_BAND * high.max():
@@ -276,7 +276,7 @@ def plot_energy(
     seen = [label for label, values in ((_LEAST, top), (_MOST, bottom)) if np.any((values >= low) & (values <= high))]
     ax.plot(t, top, label=", ".join(seen) if seen else None, **limits)
     ax.plot(t, bottom, **limits)
-    ax.plot(t, middle, label=_SEPARATRIX, color=style.VERMILION, linestyle=(0, (5, 1.5)), linewidth=1.3)
+    ax.plot(t, middle, label=_SEPARATRIX, color=style.BLACK, linestyle=(0, (5, 1.5)), linewidth=1.3)
     if certificate is not None:
         known = certificate.bounds
         edges = known.enclosure.edges
@@ -284,7 +284,7 @@ def plot_energy(
             ax.stairs(
                 values, edges, baseline=None, color=style.BLACK, linestyle=(0, (1, 1)), linewidth=1.2, label=label
             )
-    ax.plot(t, energy, label="$E$", color=style.BLACK, linewidth=1.7)
+    ax.plot(t, energy, label="$E$", color=style.GREEN, linewidth=2.0)
     ax.set_ylim(low, high)
     title = "\n".join(["energy, and the axis that the momentum circles", *beyond])
     style.in_time(ax, (t[0], t[-1]), "energy [J]", loops=motion.deformation.loops, title=title)
@@ -331,6 +331,8 @@ def plot_torques(
     for unit, twin in list(places.items())[1:]:
         twin.set_ylabel(_TORQUE_LABELS[unit], fontsize=style.SMALL)
         twin.tick_params(labelsize=style.SMALL)
+    if len(scales) > 1:
+        style.align_zeros(*places.values())
     style.in_time(ax, (t[0], t[-1]), _TORQUE_LABELS[scales[0]] if scales else "", **legend)
     return ax
 

@@ -88,7 +88,8 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
 
     Notes
     -----
-    The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it.
+    The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it. Lines that are
+    drawn there without a colour have those of Okabe and Ito.
 
     Examples
     --------
@@ -105,7 +106,9 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
         check_choice(projection, "projection", get_projection_names())
     if not inches > 0.0:
         raise ShapeError(f"height: a length above 0 [in] is needed, got {value_text(height)}")
-    return Figure(figsize=(COLUMN, inches), layout="constrained").add_subplot(projection=projection)
+    axes = Figure(figsize=(COLUMN, inches), layout="constrained").add_subplot(projection=projection)
+    axes.set_prop_cycle(color=[look["color"] for look in SERIES])
+    return axes
 
 
 def axes_image(ax: Any, ending: str, resolution: float = _RESOLUTION) -> bytes:
@@ -271,6 +274,16 @@ def finish_below(ax: Any, **place: Any) -> Any:
     return legend
 
 
+def align_zeros(*axes: Any) -> None:
+    """Widen the ordinates of several axes at one place until their zeros are at one height."""
+    limits = np.array([ax.get_ylim() for ax in axes])
+    limits[:, 0], limits[:, 1] = np.minimum(limits[:, 0], 0.0), np.maximum(limits[:, 1], 0.0)
+    spans = np.ptp(limits, axis=1)
+    shares = limits / spans[:, None]
+    for ax, span in zip(axes, spans, strict=True):
+        ax.set_ylim(shares[:, 0].min() * span, shares[:, 1].max() * span)
+
+
 def zero_line(ax: Any) -> None:
     """Draw a faint line at zero."""
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
@@ -339,6 +352,8 @@ def degrees_first(ax: Any, label: str, *, radians: bool = True) -> None:
     if radians:
         ax.yaxis.tick_right()
         ax.yaxis.set_label_position("right")
+        # Axes that share their ordinates have lost the numbers on both sides.
+        ax.tick_params(axis="y", labelright=True)
         label_ordinate(ax, f"{label} [rad]", largest)
     else:
         ax.tick_params(axis="y", left=False, labelleft=False)

@@ -20,7 +20,7 @@ from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
 from . import plot_style as style
-from ._joint_styles import MAX_NAMED, both_sides, joint_place, joint_styles, plain_text, plot_joints
+from ._joint_styles import MAX_NAMED, both_sides, joint_place, joint_styles, named_joints, plain_text, plot_joints
 from .curvature_map import component_of, draw_loop, draw_map, even_row, name_axes, row_around, squared_unit, two_joints
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def plot_shape_path(
     scales = sorted({units[k] for k in chosen}, key=("rad", "m", "1", "rad or m").index)
     places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
     legend = plot_joints(places, t, values, chosen, names, units, _SHOWN)
-    named = chosen[:MAX_NAMED]
+    named = named_joints(chosen.tolist(), units)
     shown = [names[k] for k in named]
     if body is not None and _limit_bands(places, units, body.joint_limits, values, named, joint_styles(shown)):
         legend["handles"].append(_band_patch())
