@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2
@@ -9,8 +12,9 @@ from scipy.stats import binom, chi2
 import shapephase as sp
 from shapephase import so3
 from shapephase.error_bars.result_derivatives import fit_by_inertias, fit_by_knots
-from shapephase.errors import ShapeError
+from shapephase.errors import ShapeError, TrajectoryWarning
 from shapephase.shape_space.path_samples import path_samples
+from support import bvh_files
 
 _NOISE = np.radians(0.4)
 _MOMENTUM = np.array([4.0, -6.0, 40.0])
@@ -177,3 +181,51 @@ def test_bars_of_a_recorded_flight_cover_the_truth(draws: int, joint_noise: floa
     assert np.all((inside >= least) & (inside <= most)), inside
     ratio = np.sqrt(np.mean(errors**2, axis=0)) / bars.mean(axis=0)
     np.testing.assert_allclose(ratio, 1.0, atol=max(0.15, 3.3 / np.sqrt(2.0 * draws)))
+
+
+def test_noise_of_the_joints_is_no_drift_of_the_momentum():
+    """Noise of the arms moves the reconstructed attitudes by a walk in time. Of six recordings the fit that knows this
+    noise doubts none; one that does not, which this noise is not white for, doubts some."""
+    times, rng = np.linspace(0.0, 1.0, 31), np.random.default_rng(3)
+    attitudes = sp.reconstruct(through(arms(times), 1.0), _MOMENTUM, _START, tolerance=1e-9).attitude(times)
+    doubted, errors, bars = np.zeros(2, dtype=int), [], []
+    for _ in range(6):
+        recorded = attitudes @ so3.exp(0.001 * rng.normal(size=(31, 3)))
+        noisy = through(arms(times) + 0.02 * rng.normal(size=(31, 2)), 1.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", TrajectoryWarning)
+            fits = [
+                sp.momentum_from_recording(noisy, times, recorded, joints=joints, tolerance=1e-6)
+                for joints in (None, 0.02)
+            ]
+        doubted += [np.ptp(fit.momenta, axis=0).max() > 0.0 for fit in fits]
+        errors.append(fits[1].momentum - _MOMENTUM)
+        bars.append(np.sqrt(np.diag(sp.uncertainty(fits[1].motion, start=fits[1], joints=0.02).start)[3:]))
+    assert doubted[0] > 1
+    assert doubted[1] == 0
+    assert np.all(np.abs(errors) < 4.0 * np.array(bars))
+
+
+@pytest.mark.full
+def test_a_jump_of_motion_capture_has_bars_as_long_as_its_momentum_scatters(tmp_path: Path):
+    """Of 48 draws of noise like that of the file that ships, each component of the momentum within its 95 % bars,
+    which are longer than the scatter by less than a half, even the longest by less than that twice."""
+    draws, errors, bars, counts = 48, [], [], []
+    for seed in range(draws):
+        file = bvh_files.write(tmp_path / "jump.bvh", bvh_files.jump_text(seed))
+        person = bvh_files.load(file)
+        joints = bvh_files.jump_joint_noise(person)
+        recording = sp.read_recorded_motion(file, person, flight="auto")
+        found = sp.motion_from_recording(person, recording, joints=joints, tolerance=1e-7)
+        assert found.fitted is not None
+        uncertain = sp.uncertainty(found.motion, joints=joints, start=found.fitted)
+        errors.append(found.fitted.momentum - bvh_files.JUMP_MOMENTUM)
+        bars.append(np.sqrt(np.diag(uncertain.start)[3:]))
+        counts.append(uncertain.twists)
+    inside = np.mean(np.abs(errors) < 1.959964 * np.array(bars), axis=0)
+    least, _ = binom.ppf([5e-4, 1.0], draws, 0.95) / draws
+    assert np.all(inside >= least), inside
+    scatter, bars = np.sqrt(np.mean(np.square(errors), axis=0)), np.array(bars)
+    assert np.all(bars.mean(axis=0) < 1.5 * scatter), bars.mean(axis=0) / scatter
+    assert np.all(bars.max(axis=0) < 2.0 * scatter), bars.max(axis=0) / scatter
+    assert max(counts) < 1.5 * np.median(counts)

@@ -13,6 +13,7 @@ from .. import so3
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription
 from ..deformation.rotors import Rotor, RotorDescription
 from ..display import frozen
@@ -303,7 +304,12 @@ def described_by(motion: Motion | ForcedMotion) -> Described:
         check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"derivatives are those of one motion, this is a batch of {motion.batch}; reconstruct one")
-    description = motion.deformation.description
+    return deformation_parts(motion.deformation)
+
+
+def deformation_parts(deformation: Deformation) -> Described:
+    """What a deformation is made of. Raises WrongObjectError where it is not that of a body with joints."""
+    description = deformation.description
     if isinstance(description, RotorDescription):
         return Described(description.platform, description.driven_path, description.route, description.rotors)
     if not isinstance(description, ArticulatedDescription):
