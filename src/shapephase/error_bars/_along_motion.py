@@ -379,13 +379,9 @@ class BodyAlong:
         (S r, m), from spins (N, S, 3), rows (N, S, r, 3) and momenta I w + J rate (N, S, 3), which are minus the
         derivative by the duration's logarithm where a path is closed. The momenta have what wheels store at even S.
         """
-        chain = reduced_chain(self.body.chain, self.wheels.rotors)
+        parts = self.by_shapes(spins, rows)
         closing = samples.is_closing(self.times)
-        check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
-        parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
         if self.wheels.rotors:
-            by_shape, by_rate = (derivative[..., self.wheels.driven] for derivative in parts)
-            parts = by_shape + self.wheels.by_shape(rows), by_rate
             # What wheels store does not grow with the pace.
             momenta = momenta.copy()
             momenta[:, ::2] -= self.wheels.stored[:, None]
@@ -394,6 +390,19 @@ class BodyAlong:
             by_duration = -np.einsum("nsrc,nsc->sr", rows[closing], momenta[closing]).ravel()
             by_knots += by_duration[:, None] * samples.seconds_by_knots()
         return by_knots
+
+    def by_shapes(self, spins: Array, rows: Array) -> tuple[Array, Array]:
+        """Products of row . d(I w + J rate), w staying, by the shapes and by the rates of joints that are no wheels.
+
+        (N, S r, n) each, from spins (N, S, 3) and rows (N, S, r, 3).
+        """
+        chain = reduced_chain(self.body.chain, self.wheels.rotors)
+        check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
+        parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
+        if self.wheels.rotors:
+            by_shape, by_rate = (derivative[..., self.wheels.driven] for derivative in parts)
+            return by_shape + self.wheels.by_shape(rows), by_rate
+        return parts
 
     def by_inertias(self, spins: Array, rows: Array) -> Array:
         """Derivatives by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""

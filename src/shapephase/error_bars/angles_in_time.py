@@ -7,20 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
 from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..reconstruction.attitude_angles import athlete_slopes
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.path_samples import path_samples
-from ._along_motion import responses
-from ._joint_noise import carried_by_knots
 from ._propagation import carried
-from .covariance import moved_fit_by_knots, moved_fit_by_links, moved_fit_by_rotors
+from .covariance import carried_errors, moved_fit_by_links, moved_fit_by_rotors
 from .error_sources import InertiaErrors, Inputs, by_relative_errors, inputs_of
 from .recorded_momentum import RecordedMomentum
-from .result_derivatives import described_by, fit_by_inertias, fit_by_knots, fit_by_rotors
+from .result_derivatives import described_by, fit_by_inertias, fit_by_knots, fit_by_rotors, turns_by_start
 
 
 def somersault_bars(
@@ -84,16 +80,13 @@ def somersault_bars(
 
 def _variances(motion: Motion, inputs: Inputs, times: Array, by_turns: Array) -> Array:
     """Variances of numbers with derivatives (r, 3 N) by turns of the attitude at N times, base axes: (r,)."""
-    turned = so3.transpose(motion.attitude(times)) @ responses(motion, times)
-    turned[:, :, :3] = turned[:, :, :3] @ motion.initial_attitude
-    by_start = by_turns @ turned.reshape(-1, turned.shape[2])
+    by_start = by_turns @ turns_by_start(motion, times)
     # A change that turns the attitudes moves a fit to them as their turns backwards do.
     backwards, no_rates = -by_turns, np.zeros_like(by_turns)
-    covariance = np.zeros((len(by_turns), len(by_turns)))
+    by_knots = np.zeros((len(by_turns), 0))
     if inputs.samples is not None:
-        direct = fit_by_knots(motion, times, backwards, no_rates)
-        by_knots = direct + by_start @ moved_fit_by_knots(motion, inputs)
-        covariance += carried_by_knots(path_samples(described_by(motion).path), by_knots, inputs.samples)
+        by_knots = fit_by_knots(motion, times, backwards, no_rates)
+    covariance = carried_errors(motion, inputs, by_knots, by_start)
     if inputs.links is not None:
         described = described_by(motion)
         by_parameters = fit_by_inertias(motion, times, backwards, no_rates)
@@ -102,7 +95,4 @@ def _variances(motion: Motion, inputs: Inputs, times: Array, by_turns: Array) ->
     if inputs.rotors is not None:
         direct = fit_by_rotors(motion, times, backwards, no_rates)
         covariance += carried(direct + by_start @ moved_fit_by_rotors(motion, inputs), inputs.rotors)
-    for columns, given in ((slice(3, 6), inputs.momentum), (slice(3), inputs.attitude), (slice(6), inputs.start)):
-        if given is not None:
-            covariance += carried(by_start[:, columns], given)
     return np.maximum(np.diag(covariance), 0.0)

@@ -24,6 +24,7 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
+from ._joint_noise import carried_by_knots
 from ._propagation import angle_bar, carried
 from .error_sources import InertiaErrors, Inputs, by_relative_errors, drawn_bodies, inputs_of
 from .forced_covariance import ForcedUncertainty, forced_uncertainty
@@ -345,6 +346,21 @@ def _causes(derived: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
 def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivative) -> ResultDerivative:
     """Result of a rule for each derivative of the parts."""
     return ResultDerivative(*(rule(tuple(getattr(part, name) for part in parts)) for name in (*_ROTATIONS, *_PHASES)))
+
+
+def carried_errors(motion: Motion, inputs: Inputs, by_knots: Array, by_start: Array) -> Array:
+    """Covariance (r, r) of numbers with derivatives by the path at its knots (r, knots n) and by the start (r, 6).
+
+    By errors of the joints, of momentum and start, and of a fit that these move; others do not count.
+    """
+    total = np.zeros((len(by_start), len(by_start)))
+    if inputs.samples is not None:
+        moved = by_knots + by_start @ moved_fit_by_knots(motion, inputs)
+        total += carried_by_knots(path_samples(described_by(motion).path), moved, inputs.samples)
+    for columns, given in ((slice(3, 6), inputs.momentum), (slice(3), inputs.attitude), (slice(6), inputs.start)):
+        if given is not None:
+            total += carried(by_start[:, columns], given)
+    return total
 
 
 def moved_fit_by_knots(motion: Motion, inputs: Inputs) -> Array:

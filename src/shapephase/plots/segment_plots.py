@@ -156,6 +156,8 @@ def plot_somersault(ax: Axes, motion: Motion, *, times: Array | None = None, **e
 def plot_shares(ax: Axes, shares: Contributions) -> Axes:
     """Draw for each group what it adds on average (Shapley), and what is lost with it on the baseline.
 
+    Error bars are those of a recording's noise, one standard deviation, else the numerical errors.
+
     Parameters
     ----------
     ax : flat axes
@@ -172,10 +174,13 @@ def plot_shares(ax: Axes, shares: Contributions) -> Axes:
     check_object(shares, "Contributions", "shares")
     check_flat_axes(ax)
     names, places = list(shares.groups), np.arange(len(shares.groups))
-    lost = shares.whole - shares.without[: len(names)]
+    lost, bars = shares.whole - shares.without[: len(names)], shares.bars
+    of_shared, of_lost = shares.errors, np.full(len(names), shares.error)
+    if bars is not None:
+        of_shared, of_lost = bars.shared[: len(names)], bars.lost[: len(names)]
     for values, errors, offset, colour, text in (
-        (shares.shared, shares.errors, -0.5, BLUE, "shared: average over all orders"),
-        (lost, np.full(len(names), shares.error), 0.5, ORANGE, "lost when held"),
+        (shares.shared, of_shared, -0.5, BLUE, "shared: average over all orders"),
+        (lost, of_lost, 0.5, ORANGE, "lost when held"),
     ):
         ax.barh(places + offset * _BAR, values / shares.scale, _BAR, color=colour, label=text,
                 xerr=errors / shares.scale, error_kw={"elinewidth": 0.8, "capsize": 1.5})  # fmt: skip
