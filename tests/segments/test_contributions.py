@@ -659,9 +659,8 @@ def test_bars_of_shares_are_slopes_of_shares_of_other_samples_and_momenta(of, li
     samples, step = arm_samples(size), 1e-4
     motion = noisy_dive(samples, start=start)
     how = {"of": of, "link": link, "baseline": baseline, "at": 0.6 if of == "tilt" else "mid-twist"}
-    if link is None:
-        axes = motion.athlete_axes()
-        how |= {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
+    axes = motion.athlete_axes()
+    how |= AXES if link else {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
     for number in (1, 8, 25):
         moved = samples.ravel().copy()[None] + step * np.outer([1.0, -1.0], np.arange(26) == number)
         ahead, behind = (of_bars(sp.contributions(noisy_dive(row.reshape(13, 2), start=start), **how)) for row in moved)

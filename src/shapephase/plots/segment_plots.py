@@ -148,7 +148,7 @@ def plot_somersault(ax: Axes, motion: Motion, *, times: Array | None = None, **e
     for name, angle, width, style in zip(names, angles, widths, SERIES, strict=False):
         ax.fill_between(t, angle - width, angle + width, color=style["color"], alpha=0.3, linewidth=0.0)
         ax.plot(t, angle, label=name, **style)
-    in_time(ax, (t[0], t[-1]), "[rad]", **({"title": "± 2 standard deviations, at most"} if errors else {}))
+    in_time(ax, (t[0], t[-1]), "[rad]", title="± 2 standard deviations, at most" if errors else None)
     degrees_first(ax, "angle", radians=False)
     return ax
 

@@ -141,18 +141,20 @@ class Contributions:
 
         With bars of the noise where they are known, else shares of sampled orders with their standard errors.
         """
-        shares, pairs = dict(zip(self.groups, self.shared, strict=True)), self._pairs
-        shared = [
-            shares[name] if name in shares else sum(shares[one] for one in pairs[name]) for name in self.held_names
-        ]
+        shares, text = dict(zip(self.groups, self.shared, strict=True)), self.text
+        shared = [sum(shares[member] for member in self._pairs.get(name, (name,))) for name in self.held_names]
         values = np.array([self.without, self.alone, shared])
         bars, ends = np.zeros_like(values), (0.0, 0.0, 0.0)
         bars[2, : len(shares)] = self.errors
         if self.bars is not None:
             bars, ends = np.array([self.bars.without, self.bars.alone, self.bars.shared]), self.bars.ends
-        texts = [map(self.text, *columns) for columns in zip(values.T, bars.T, strict=True)]
-        rows = [(name, *row) for name, row in zip(self.held_names, texts, strict=True)]
-        return [*rows, ("all groups", *map(self.text, (self.none, self.whole, self.shared.sum()), ends))]
+        names, values = [*self.held_names, "all groups"], [*values.T, (self.none, self.whole, self.shared.sum())]
+        return [
+            (name, text(held, of_held), text(alone, of_alone), text(share, of_share))
+            for name, (held, alone, share), (of_held, of_alone, of_share) in zip(
+                names, values, [*bars.T, ends], strict=True
+            )
+        ]
 
     def direct_rows(self) -> list[tuple[str, str]]:
         """Return sources of the direct shares that did something, the largest first, with their totals."""
