@@ -17,7 +17,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.cli import progress
 from shapephase.cli.main import main
-from shapephase.errors import ShapeError, UnknownNameError, WrongObjectError
+from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.examples import cat_righting, satellite_sweep
 from shapephase.plots import FIGURES, report, write_figure
 from shapephase.plots.pages.report_data import continued_rotation_vectors
@@ -154,8 +154,6 @@ def test_somersault_has_bands_of_two_standard_deviations_and_other_figures_refus
         assert text.get_text().endswith(f"± {2.0 * np.degrees(bar.max()):.2g}°")
     with pytest.raises(ShapeError, match="somersault"):
         sp.plots.write_figure("attitude", motion, tmp_path / "a.svg", errors=errors)
-    with pytest.raises(WrongObjectError, match="joints"):
-        sp.plots.plot_somersault(sp.plots.column_axes(), motion, joint=0.1)
 
 
 @pytest.mark.full
