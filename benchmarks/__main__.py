@@ -258,6 +258,7 @@ def print_workloads(contestants: list[Contestant], numbers: list[int], *, quick:
     print_table("a black box for the first time", contestants, "first_black_boxes", numbers)
     print_table("after a reconstruction", contestants, "afterwards", turns, numbers)
     print_table("exact derivatives", contestants, "derivative_costs", turns)
+    print_table("error bars of 1,000 noisy samples", contestants, "error_bar_costs", turns)
     print_table("recorded motions", contestants, "recorded", 3, rows)
     print_table("many momenta", contestants, "many_momenta", many, 20 if quick else 100)
     print_table("threads, by the clock", contestants, "threads", many, few)

@@ -154,6 +154,27 @@ def derivative_costs(turns: int) -> dict[str, float]:
     return found
 
 
+def error_bar_costs(turns: int) -> dict[str, float]:
+    """Error bars by noise of 1,000 samples in ten seconds, as ratios to the reconstruction, and in time [ms]."""
+    found: dict[str, float] = {}
+    for name in _DERIVED:
+        body = sp.load_body(name)
+        size = float(np.trace(body.locked_inertia(np.zeros(body.n_shape)))) / 3.0
+        deformation = sp.articulated(body, spline(body, 3, 1000, 10.0))
+        taken = []
+        for _ in range(turns + 1):
+            began = time.process_time()
+            motion = sp.reconstruct(deformation, size * np.array([0.6, -1.0, 2.0]), tolerance=TOLERANCE)
+            done = time.process_time()
+            assert sp.uncertainty(motion, joints=0.005).holonomy.any()
+            taken.append((done - began, time.process_time() - done))
+        single, bars = np.median(taken[1:], axis=0)
+        short = name.removeprefix("example:")
+        found[f"{short}: reconstruct [ms]"] = 1e3 * float(single)
+        found[f"{short}: bars / reconstruct"] = float(bars / single)
+    return found
+
+
 # ---- Many at once ---------------------------------------------------------------------------------------------------
 
 

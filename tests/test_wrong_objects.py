@@ -140,9 +140,11 @@ def test_every_function_that_hands_keywords_on_names_one_that_it_does_not_have(t
         "write_bvh": (sp.exports.write_bvh, motion, tmp_path / "m.bvh"),
         "write_opensim_motion": (sp.exports.write_opensim_motion, motion, tmp_path / "m.mot"),
     }
-    assert set(handing_on()) == {*calls, "contributions"}
+    assert set(handing_on()) == {*calls, "contributions", "plot_somersault"}
     with pytest.raises(WrongObjectError, match="Did you mean 'lateral'"):
         sp.contributions(motion, laterel="x")
+    with pytest.raises(WrongObjectError, match="Did you mean 'joints'"):
+        sp.plots.plot_somersault(sp.plots.column_axes(), motion, joint=0.1)
     for place, (call, *arguments) in calls.items():
         said = rf"^unknown argument of {place.rpartition('.')[2]} 'gravitation'. Did you mean 'gravity'\? Valid: "
         with pytest.raises(WrongObjectError, match=said):

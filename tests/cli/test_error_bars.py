@@ -180,3 +180,26 @@ def test_torques_of_a_recording_have_bars_or_say_that_none_are_known(capfd, take
             # Peak, per kg, two shares of limits, rate, power and work.
             assert line.count("±") == 7
     assert "± unknown" in said(capfd, "torques", "diver", take, *MOMENTUM)
+
+
+def test_the_figure_of_a_somersault_has_the_bars_of_the_recording(take, tmp_path, capfd):
+    """Those that are stated, and those of the smoothing: the file is that of the library."""
+    momentum, body = [2.0, 40.0, 3.0], sp.load_body("diver")
+    figure = ("plot", "somersault", "diver", take, "--momentum", "2", "40", "3", "--out", tmp_path / "by_command.svg")
+    smoothed = sp.read_recorded_motion(take, body, smooth="0.3deg")
+    exact = sp.read_shape_path(take, body)
+    for options, path, errors in (
+        (("--joint-noise", "0.3deg"), exact, {"joints": "0.3deg"}),
+        (("--smooth", "0.3deg"), smoothed.path, {"joints": smoothed.smoothing.noise}),
+        ((), exact, {}),
+    ):
+        said(capfd, *figure, *options)
+        motion = sp.reconstruct(sp.articulated(body, path), momentum)
+        sp.plots.write_figure("somersault", motion, tmp_path / "by_library.svg", errors=errors)
+        texts = [(tmp_path / f"by_{source}.svg").read_text(encoding="utf-8") for source in ("command", "library")]
+        # Matplotlib's names of markers and clips are random.
+        drawn, expected = (re.sub(r"\b[mp][0-9a-f]{10}\b", "", text) for text in texts)
+        assert drawn == expected
+    with pytest.raises(SystemExit):
+        main(["plot", "phases", *map(str, figure[2:]), "--joint-noise", "0.3deg"])
+    assert "error bars" in capfd.readouterr().err

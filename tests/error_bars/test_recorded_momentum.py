@@ -10,7 +10,7 @@ from scipy.stats import binom, chi2
 import shapephase as sp
 from shapephase import so3
 from shapephase.error_bars._along_motion import responses
-from shapephase.errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
+from shapephase.errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning, WrongObjectError
 
 # What is computed is the same with and without machine code, which is quicker.
 
@@ -121,7 +121,8 @@ def test_noise_that_is_correlated_makes_longer_bars(kind: str, least: float, mos
     assert draws == 2 or np.all(inside.mean(axis=0) >= 0.92), inside.mean(axis=0)
 
 
-def test_a_momentum_that_changes_is_held_by_the_bars_and_said():
+@pytest.mark.parametrize("joints", [None, "0.3deg"])
+def test_a_momentum_that_changes_is_held_by_the_bars_and_said(joints: str | None):
     """The rate of a rigid body about its middle axis is prescribed, and doubles: so does the momentum."""
     body, times = sp.load_body("diver"), np.linspace(0.0, 0.8, 41)
     arms = np.tile([0.3, -0.3], (41, 1))
@@ -129,7 +130,7 @@ def test_a_momentum_that_changes_is_held_by_the_bars_and_said():
     noise = so3.exp(np.radians(0.3) * np.random.default_rng(1).normal(size=(41, 3)))
     deformation = sp.articulated(body, sp.ShapePath.spline(times, arms, periodic=False))
     with pytest.warns(TrajectoryWarning, match="conserved"):
-        found = sp.momentum_from_recording(deformation, times, turned @ noise, tolerance=1e-6)
+        found = sp.momentum_from_recording(deformation, times, turned @ noise, joints=joints, tolerance=1e-6)
     truth = np.outer(3.0 * (1.0 + times / 0.8), body.locked_inertia(arms[0])[:, 1])
     bar = 1.959964 * np.sqrt(np.diag(found.momentum_covariance))
     assert np.all(np.abs(truth - found.momentum) < bar)
@@ -183,3 +184,7 @@ def test_what_cannot_be_fitted():
         sp.momentum_from_recording(somersault(), _TIMES[:2], attitudes[:2])
     with pytest.raises(ShapeError, match="positive"):
         sp.momentum_from_recording(somersault(), _TIMES, attitudes, noise=0.0)
+    with pytest.raises(ShapeError, match="joints"):
+        sp.momentum_from_recording(somersault(), _TIMES, attitudes, joints=-0.1)
+    with pytest.raises(WrongObjectError, match="articulated"):
+        sp.momentum_from_recording(sp.rigid(np.eye(3), 1.0), _TIMES, attitudes, joints=0.1)

@@ -64,6 +64,7 @@ FIGURES = {
     "torques": lambda ax: plots.plot_torques(ax, motion("cat")),
     "segment_momentum": lambda ax: plots.plot_segment_momentum(ax, sp.segment_momentum(motion("cat"))),
     "somersault": lambda ax: plots.plot_somersault(ax, motion("diver")),
+    "somersault with error bars": lambda ax: plots.plot_somersault(ax, motion("diver"), momentum=0.5, attitude=0.02),
     "shares": lambda ax: plots.plot_shares(ax, shares()),
     "direct_shares": lambda ax: plots.plot_direct_shares(ax, shares()),
     "reach": lambda ax: plots.plot_reach(ax, sp.reachable(sp.load_body("cat_two_halves"))),

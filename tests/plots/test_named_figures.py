@@ -139,6 +139,23 @@ def test_somersault_tilt_and_twist_come_first_of_a_person(tmp_path):
     assert len(drawn) == 6
 
 
+def test_somersault_has_bands_of_two_standard_deviations_and_other_figures_refuse_errors(tmp_path):
+    path = sp.ShapePath.fourier(np.zeros(2), 0.3 * np.ones((2, 1)), np.array([[0.2], [0.1]]), 1.0)
+    motion = sp.reconstruct(sp.articulated("diver", path), [0.0, 50.0, 0.0])
+    times, errors = np.linspace(0.0, 1.0, 61), {"momentum": 0.5, "attitude": 0.02}
+    ax = sp.plots.plot_somersault(sp.plots.column_axes(), motion, times=times, **errors)
+    bars = sp.error_bars.somersault_bars(motion, times, **errors)
+    angles = motion.somersault_tilt_twist(times)
+    for band, text, angle, bar in zip(ax.collections, ax.get_legend().get_texts(), angles, bars, strict=True):
+        (drawn,) = band.get_paths()
+        for edge in (angle - 2.0 * bar, angle + 2.0 * bar):
+            for corner in np.stack([times, edge], axis=1):
+                assert np.abs(drawn.vertices - corner).max(axis=1).min() < 1e-9
+        assert text.get_text().endswith(f"± {2.0 * np.degrees(bar.max()):.2g}°")
+    with pytest.raises(ShapeError, match="somersault"):
+        sp.plots.write_figure("attitude", motion, tmp_path / "a.svg", errors=errors)
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("momentum", [True, False])
 def test_the_report_says_what_the_split_says(sweep, tmp_path, momentum, request):

@@ -622,3 +622,122 @@ def test_a_baseline_that_does_not_exist_is_named_with_the_nearest(capsys):
     with pytest.raises(SystemExit):
         main(["contributions", *DIVE, "--baseline", "frist"])
     assert "unknown baseline (no such file either) 'frist'. Did you mean 'first'?" in capsys.readouterr().err
+
+
+def noisy_dive(samples, momentum=(4.0, 60.0, 6.0), start=(0.3, 0.2, 0.1), **others):
+    """A second of a diver whose arms go through samples (13, 2)."""
+    path = sp.ShapePath.spline(np.linspace(0.0, 1.0, 13), samples, periodic=False)
+    deformation = sp.articulated("diver", path, **others)
+    return sp.reconstruct(deformation, momentum, Rotation.from_rotvec(start).as_matrix(), tolerance=1e-10)
+
+
+def arm_samples(size=1.0):
+    times = np.linspace(0.0, 1.0, 13)
+    return np.stack([1.2 + size * np.sin(TURNS * times), 1.0 + size * np.cos(5.0 * times)], axis=1)
+
+
+def of_bars(shares):
+    """What has a bar, in the order of its fields."""
+    lost, change = shares.whole - shares.without, shares.whole - shares.none
+    by_name = dict(zip(shares.groups, shares.shared, strict=True))
+    shared = [by_name[name] if name in by_name else sum(by_name.values()) for name in shares.held_names]
+    return np.hstack([shares.whole, shares.none, change, shares.without, shares.alone, lost, shared])
+
+
+def bars_of(shares):
+    names = ("whole", "none", "change", "without", "alone", "lost", "shared")
+    return np.hstack([getattr(shares.bars, name) for name in names])
+
+
+@pytest.mark.parametrize(
+    ("of", "link", "baseline"),
+    [("twist", None, "first"), *(full_but([("tilt", "left_arm", "first"), ("somersault", None, "neutral")]))],
+)
+def test_bars_of_shares_are_slopes_of_shares_of_other_samples_and_momenta(of, link, baseline):
+    """Central differences, of one number at a time with variance one, its first sample included."""
+    size, start = (0.05, (0.0, 0.0, 0.0)) if link else (1.0, (0.3, 0.2, 0.1))
+    samples, step = arm_samples(size), 1e-4
+    motion = noisy_dive(samples, start=start)
+    how = {"of": of, "link": link, "baseline": baseline, "at": 0.6 if of == "tilt" else "mid-twist"}
+    axes = motion.athlete_axes()
+    how |= AXES if link else {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
+    for number in (1, 8, 25):
+        moved = samples.ravel().copy()[None] + step * np.outer([1.0, -1.0], np.arange(26) == number)
+        ahead, behind = (of_bars(sp.contributions(noisy_dive(row.reshape(13, 2), start=start), **how)) for row in moved)
+        alone = np.diag((np.arange(26) == number).astype(float))
+        expected = np.abs(ahead - behind) / (2.0 * step)
+        np.testing.assert_allclose(bars_of(sp.contributions(motion, joints=alone, **how)), expected, atol=1e-6)
+    ahead, behind = (
+        of_bars(sp.contributions(noisy_dive(samples, (4.0, 60.0 + change, 6.0), start), **how))
+        for change in (step, -step)
+    )
+    of_momentum = np.diag([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+    expected = np.abs(ahead - behind) / (2.0 * step)
+    np.testing.assert_allclose(bars_of(sp.contributions(motion, start=of_momentum, **how)), expected, atol=1e-6)
+
+
+@pytest.mark.full
+def test_shares_of_recordings_scatter_as_far_as_their_bars():
+    """120 recordings with noise of arms, momentum and start together: bars of any are those of the truth."""
+    rng, draws, noise = np.random.default_rng(4), 120, 0.004
+    spread = np.array([0.003, 0.004, 0.002, 0.05, 0.2, 0.1])
+    truth = noisy_dive(arm_samples())
+    axes = truth.athlete_axes()
+    how = {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
+    shares = sp.contributions(truth, joints=noise, start=np.diag(spread**2), **how)
+    drawn = []
+    for _ in range(draws):
+        change = spread * rng.normal(size=6)
+        start = Rotation.from_rotvec([0.3, 0.2, 0.1]) * Rotation.from_rotvec(change[:3])
+        samples = arm_samples() + noise * rng.normal(size=(13, 2))
+        moved = noisy_dive(samples, np.array([4.0, 60.0, 6.0]) + change[3:], start.as_rotvec())
+        drawn.append(of_bars(sp.contributions(moved, **how)))
+    np.testing.assert_allclose(np.std(drawn, axis=0, ddof=1), bars_of(shares), rtol=4.0 / np.sqrt(2.0 * draws))
+
+
+def test_shares_of_random_orders_and_with_wheels_have_bars(monkeypatch):
+    """Many random orders tend to all of them, and their shares add up alike; a wheel that stores nothing and weighs
+    little changes no bar."""
+    motion = noisy_dive(arm_samples())
+    exact = sp.contributions(motion, joints=0.01)
+    wheel = sp.load_body("diver").with_wheel([0.0, 0.0, 1.0], 1e-4)
+    (name,) = set(wheel.joint_names) - set(sp.load_body("diver").joint_names)
+    with_wheel = sp.reconstruct(
+        sp.articulated(wheel, motion.deformation.description.path, rotors={name: 0.0}),
+        motion.momentum,
+        motion.initial_attitude,
+        tolerance=1e-10,
+    )
+    found = sp.contributions(with_wheel, joints=0.01, groups={"left arm": "left_*", "right arm": "right_*"})
+    plain = sp.contributions(motion, joints=0.01, groups={"left arm": "left_*", "right arm": "right_*"})
+    np.testing.assert_allclose(bars_of(found), bars_of(plain), rtol=1e-3)
+    monkeypatch.setattr("shapephase.segments.limb_contributions.MOST_EXACT", 1)
+    sampled = sp.contributions(motion, joints=0.01, orders=2000, seed=3)
+    assert sampled.interactions is None
+    assert sampled.bars.shared[-1] == pytest.approx(exact.bars.change, rel=1e-9)
+    np.testing.assert_allclose(sampled.bars.shared, exact.bars.shared, rtol=0.1)
+
+
+def test_the_command_prints_bars_of_a_recording_in_table_json_and_page(tmp_path, capfd):
+    file, page = ROBOTS / "diver_dive.mot", tmp_path / "shares.html"
+    command = ["contributions", "diver", str(file), "--flight", "auto", "--joint-noise", "0.3deg"]
+    main([*command, "--json", "--html", str(page)])
+    data = json.loads(capfd.readouterr().out)
+    recording = sp.read_recorded_motion(file, "diver", flight="auto")
+    found = sp.motion_from_recording("diver", recording, joints="0.3deg")
+    shares = sp.contributions(found.motion, joints="0.3deg", start=found.fitted, up="y")
+    for name in ("whole", "shared", "without"):
+        np.testing.assert_allclose(data["bars"][name], getattr(shares.bars, name), rtol=1e-6)
+    (row,) = (row for row in shares.rows() if row[0] == "left arm")
+    assert all(" ± " in text for text in row[1:])
+    assert row[3] in page.read_text(encoding="utf-8")
+    assert row[3] in str(shares)
+    main([*command[:5], "--of", "rotation", "--json"])
+    assert json.loads(capfd.readouterr().out)["bars"] is None
+
+
+def test_errors_beside_results_without_bars_are_refused():
+    motion = noisy_dive(arm_samples())
+    for given in ({"of": "rotation"}, {"of": "phase"}, {"baseline": "mirrored"}, {"of": lambda flown: flown.duration}):
+        with pytest.raises(WrongObjectError, match="error bars"):
+            sp.contributions(motion, joints=0.01, **given)

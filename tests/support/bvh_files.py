@@ -10,6 +10,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -143,14 +144,18 @@ def load(path, **options):
 JUMP = ROBOTS / "formats" / "jump.bvh"
 JUMP_MOMENTUM = np.array([75.0, 0.0, 0.0])
 """[kg m^2/s] Forwards about the axis from right to left."""
+JUMP_JOINT_NOISE = 0.2
+"""[deg]"""
 
 
-def jump_text() -> str:
-    """Somersault with a twist off a trampoline: the left arm lowers and lifts again; with noise."""
-    # Not every seed: in 5 of 36 the fit, which does not know the joints' noise, has bars 2.5 to 40 times as long.
-    rng, step = np.random.default_rng(6), 1.0 / 60.0
-    times = step * np.arange(61)
-    rows, names = np.zeros((len(times), len(columns()))), columns()
+_JUMP_STEP = 1.0 / 60.0
+_JUMP_TIMES = _JUMP_STEP * np.arange(61)
+
+
+@cache
+def _clean_jump() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows of the joints (61, c), places [m] and attitudes of the hips: without noise."""
+    times, rows, names = _JUMP_TIMES, np.zeros((61, len(columns()))), columns()
 
     def rise(first: float, last: float) -> np.ndarray:
         part = np.clip((times - first) / (last - first), 0.0, 1.0)
@@ -163,17 +168,30 @@ def jump_text() -> str:
     for name, angles in turned.items():
         rows[:, names.index(f"{name}rotation")] = angles
     with tempfile.TemporaryDirectory() as folder:
-        body = load(write(Path(folder) / "jump.bvh", bvh_text(rows, step)))
+        body = load(write(Path(folder) / "jump.bvh", bvh_text(rows, _JUMP_STEP)))
         path = sp.read_shape_path(body.file, body)
         flown = sp.reconstruct(sp.articulated(body, path), JUMP_MOMENTUM)
         places = flown.base_position(times, start=[0.0, 1.2, 0.0], velocity=[0.0, 4.9, 0.2], gravity=[0.0, -9.81, 0.0])
-    noise = rng.normal(size=(len(times), 3))
-    hips = Rotation.from_matrix(flown.attitude(times)) * Rotation.from_rotvec(np.radians(0.3) * noise)
+    return rows, places, flown.attitude(times)
+
+
+def jump_text(seed: int = 6) -> str:
+    """Somersault with a twist off a trampoline: the left arm lowers and lifts again; with noise."""
+    rng, (clean, places, attitudes) = np.random.default_rng(seed), _clean_jump()
+    rows, names = clean.copy(), columns()
+    noise = rng.normal(size=(len(rows), 3))
+    hips = Rotation.from_matrix(attitudes) * Rotation.from_rotvec(np.radians(0.3) * noise)
     rows[:, :3] = (places + 0.001 * rng.normal(size=places.shape)) / UNIT
     rows[:, 3:6] = hips.as_euler("ZYX", degrees=True)
     tracked = [k for k, name in enumerate(names) if k > 5 and not _RIGID.search(name)]
-    rows[:, tracked] += 0.2 * rng.normal(size=(len(times), len(tracked)))
-    return bvh_text(rows.round(2), step)
+    rows[:, tracked] += JUMP_JOINT_NOISE * rng.normal(size=(len(rows), len(tracked)))
+    return bvh_text(rows.round(2), _JUMP_STEP)
+
+
+def jump_joint_noise(body: sp.Body) -> np.ndarray:
+    """Standard deviations of the quaternions' components of each ball joint: half of a turn's, none of rigid bones."""
+    tracked = np.array([not _RIGID.search(name) for name in body.joint_names])
+    return 0.5 * np.radians(JUMP_JOINT_NOISE) * tracked
 
 
 if __name__ == "__main__":

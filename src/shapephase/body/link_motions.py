@@ -33,15 +33,15 @@ def link_motions(chain: JointChain, shapes: Array, rates: Array) -> LinkMotions:
     turns = np.empty((count, frames, 3, 3))
     places, speeds, spins = np.zeros((3, count, frames, 3))
     turns[:, 0] = np.eye(3)
-    # All joints at once, from the parent's axes to the child's.
+    # All joints at once, about their axes from the posture at zero.
     at_rest = chain.turns_at(shapes)
-    turned = at_rest @ so3.exp(all_coordinates[..., None] * chain.axes)
+    turned = so3.exp(all_coordinates[..., None] * chain.axes)
     for joints, parents in chain.generations:
         before, spin = turns[:, parents] @ at_rest[:, joints], spins[:, parents]
         coordinate, rate = all_coordinates[:, joints, None], all_rates[:, joints, None]
         slide = so3.apply(before, chain.slides[joints])
         step = so3.apply(turns[:, parents], chain.places[joints]) + slide * coordinate
-        turns[:, joints + 1] = turns[:, parents] @ turned[:, joints]
+        turns[:, joints + 1] = before @ turned[:, joints]
         spins[:, joints + 1] = spin + so3.apply(before, chain.axes[joints]) * rate
         # From origin to origin, so that nothing far away is taken off again.
         places[:, joints + 1] = places[:, parents] + step

@@ -69,6 +69,13 @@ def contributions_command(
             allow_leading_hyphen=True,
         ),
     ] = None,
+    joint_noise: Annotated[
+        str | None,
+        option(
+            "Print error bars of twist, tilt and somersault for this noise of the samples, one standard deviation, in "
+            "rad or m or with units; default: that of --smooth. For example `--joint-noise 0.3deg`."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         rare("Write the direct shares in time, in rad, to this CSV file; for example `--out shares.csv`."),
@@ -88,14 +95,16 @@ def contributions_command(
     """Find who made a turn: the share of momentum and limbs in a twist, tilt or somersault.
 
     Direct: what each did along the motion. Held: the motion again with a limb held. Shared: what a limb adds, averaged
-    over all orders in which limbs join (Shapley).
+    over all orders in which limbs join (Shapley). A recording's noise gives error bars.
     """
     from ..errors import unknown_name
     from ..examples.scenarios import MOTIONS
-    from ..segments.held_motions import BASELINES
+    from ..segments.direct_shares import ANGLES
+    from ..segments.held_motions import BASELINES, POSTURES
     from ..segments.limb_contributions import contributions
     from ..segments.limbs import groups_of_words
     from . import motion as motions
+    from .texts.error_bar_text import input_errors
     from .texts.recording_text import recording_data
     from .texts.result_text import split_heading
 
@@ -107,7 +116,15 @@ def contributions_command(
         raise unknown_name("baseline (no such file either)", baseline, (*BASELINES, *MOTIONS))
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating, wheels=wheels)
+        flown = motions.flight(
+            body, motion, start, recording, tolerance, work.watch, joint_noise=joint_noise, floating=floating,
+            wheels=wheels,
+        )  # fmt: skip
+        noise = {}
+        if joint_noise is not None or (of in ANGLES and baseline in POSTURES):
+            noise = input_errors(
+                flown.motion, options.ErrorOptions(joint_noise=joint_noise), flown.recorded, flown.fitted
+            )
         other = baseline
         if baseline not in BASELINES:
             other = motions.flight(
@@ -125,6 +142,8 @@ def contributions_command(
             lateral=lateral,
             longitudinal=longitudinal,
             up=recording.up,
+            joints=noise.get("joints"),
+            start=noise.get("start"),
         )
         write_file(out, shares.write_csv)
         if figure is not None:

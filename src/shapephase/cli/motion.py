@@ -108,10 +108,14 @@ def flight(
     *,
     gauge: str = "base",
     trail: str | None = None,
+    joint_noise: str | None = None,
     floating: BodyOptions = BODY_DEFAULTS,
     wheels: WheelOptions = WHEEL_DEFAULTS,
 ) -> LoadedMotion:
-    """Return the motion of a command. Gauge, tolerance and trail are checked before the motion is read."""
+    """Return the motion of a command. Gauge, tolerance and trail are checked before the motion is read.
+
+    joint_noise : for the fit of a momentum; None: that of the smoothing
+    """
     start = _start(motion, options)
     goal = tolerance_argument(tolerance)
     momentum = None if options.momentum is None else finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
@@ -139,6 +143,7 @@ def flight(
         rate=rate,
         rate_time=options.rate_time or 0.0,
         attitude=start,
+        joints=joint_noise,
         tolerance=goal,
         find_axes=recording.base_axes == ESTIMATE,
         progress=progress,

@@ -129,12 +129,13 @@ def plot_command(
     out: options.FigureFile,
     start: options.StartOptions = options.START_DEFAULTS,
     gauge: options.Gauge = "horizontal",
+    errors: options.ErrorOptions = options.ERROR_DEFAULTS,
     wheels: options.WheelOptions = options.WHEEL_DEFAULTS,
     recording: options.RecordingOptions = options.RECORDING_DEFAULTS,
     floating: options.BodyOptions = options.BODY_DEFAULTS,
     printing: options.PrintOptions = options.PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
-    """Draw one figure of a motion, one column wide.
+    """Draw one figure of a motion, one column wide; somersault, tilt and twist with error bars of a recording.
 
     Parameters
     ----------
@@ -145,6 +146,7 @@ def plot_command(
     from ..arguments import check_choice
     from ..plots.named_figures import FIGURES, write_figure
     from . import motion as motions
+    from .texts.error_bar_text import input_errors
     from .texts.recording_text import recording_data
 
     check_choice(kind, "kind of figure", FIGURES)
@@ -154,12 +156,16 @@ def plot_command(
     with steps(2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(
-            body, motion, start, recording, progress=work.watch, gauge=gauge, floating=floating, wheels=wheels
-        )
+            body, motion, start, recording, progress=work.watch, gauge=gauge, joint_noise=errors.joint_noise,
+            floating=floating, wheels=wheels,
+        )  # fmt: skip
         if FIGURES[kind].with_momentum and not flown.motion.momentum.any():
             raise _no_momentum(kind)
         work.begin(f"drawing {kind.replace('_', ' ')}")
-        write_file(out, lambda file: write_figure(kind, flown.motion, file, flown.path, gauge))
+        given = {}
+        if FIGURES[kind].with_errors or errors != options.ERROR_DEFAULTS:
+            given = input_errors(flown.motion, errors, flown.recorded, flown.fitted)
+        write_file(out, lambda file: write_figure(kind, flown.motion, file, flown.path, gauge, errors=given))
     data = {"figure": str(out)} | recording_data(flown.recorded)
     return Outcome(_heading(flown, motion), data, made_from=flown.motion.deformation.made_from)
 

@@ -80,8 +80,9 @@ def split_command(
     with steps(3 if html else 2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(
-            body, motion, start, recording, tolerance, work.watch, gauge=gauge, floating=floating, wheels=wheels
-        )
+            body, motion, start, recording, tolerance, work.watch, gauge=gauge, joint_noise=errors.joint_noise,
+            floating=floating, wheels=wheels,
+        )  # fmt: skip
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
         bars = error_bars(flown.motion, errors, flown.recorded, flown.fitted)

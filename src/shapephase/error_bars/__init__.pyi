@@ -1,3 +1,4 @@
+from .angles_in_time import somersault_bars
 from .covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_sources import InertiaErrors
 from .forced_covariance import ForcedUncertainty
@@ -17,5 +18,6 @@ __all__ = [
     "momentum_from_recording",
     "motion_from_recording",
     "sampled_uncertainty",
+    "somersault_bars",
     "uncertainty",
 ]

@@ -378,13 +378,20 @@ class BodyAlong:
 
         (S r, m), from spins (N, S, 3) and rows (N, S, r, 3).
         """
+        return samples.by_knots(self.times, *self.by_shapes(spins, rows))
+
+    def by_shapes(self, spins: Array, rows: Array) -> tuple[Array, Array]:
+        """Products of row . d(I w + J rate), w staying, by the shapes and by the rates of joints that are no wheels.
+
+        (N, S r, n) each, from spins (N, S, 3) and rows (N, S, r, 3).
+        """
         chain = reduced_chain(self.body.chain, self.wheels.rotors)
         check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
         parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
         if self.wheels.rotors:
             by_shape, by_rate = (derivative[..., self.wheels.driven] for derivative in parts)
-            parts = by_shape + self.wheels.by_shape(rows), by_rate
-        return samples.by_knots(self.times, *parts)
+            return by_shape + self.wheels.by_shape(rows), by_rate
+        return parts
 
     def by_inertias(self, spins: Array, rows: Array) -> Array:
         """Derivatives by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""

@@ -57,13 +57,17 @@ class ResidualNoise:
         """Covariance of parameters that are linear in these residuals: estimator (m, 3 N) -> (m, m)."""
         return _by_correlation(estimator) @ (self.weights * self.variances)
 
-    def chance(self, last: int) -> float:
-        """Probability that the last few parameters come out so far from zero although they are zero: the F test."""
+    def chance(self, last: int, added: Array) -> float:
+        """Probability that the last few parameters come out so far from zero although they are zero: the F test.
+
+        added : (last, last) covariance of these parameters by what is no noise of the residuals' kinds
+        """
         from scipy.special import fdtrc
 
         parameters = self.parameters[:, -last:]
-        known = np.linalg.inv(np.linalg.inv(self.precisions)[:, -last:, -last:])
-        ratios = np.einsum("fa,fab,fb->f", parameters, known, parameters) / (last * self.variances)
+        by_noise = np.linalg.inv(self.precisions)[:, -last:, -last:]
+        known = np.linalg.inv(self.variances[:, None, None] * by_noise + added)
+        ratios = np.einsum("fa,fab,fb->f", parameters, known, parameters) / last
         return float(self.weights @ fdtrc(last, self.free, ratios))
 
 
@@ -131,10 +135,12 @@ def _correlations(count: int) -> Array:
     return np.concatenate([_EXPONENTIAL[:, None] ** lags, smoothed])
 
 
-def drift_modes(residuals: Array, slopes: Array, by_modes: Array) -> tuple[int, bool]:
+def drift_modes(residuals: Array, slopes: Array, by_modes: Array, carried: Array) -> tuple[int, bool]:
     """Number of Legendre polynomials of the momentum in time that the residuals need, and whether surely.
 
-    residuals (N, 3) [rad], slopes (3 N, m), by_modes (3 N, 3 K): change of the attitudes by each polynomial's momentum.
+    residuals (N, 3) [rad], slopes (3 N, m), by_modes (3 N, 3 K): change of the attitudes by each polynomial's momentum;
+    carried (3 N, c): of what noise of the joints turns the reconstruction by, the part that slopes and modes explain,
+    for c independent numbers of variance one. It grows in time as no noise of the attitudes does.
     One more polynomial counts where chance brings as much in less than one of 50 cases, also together with the next:
     bars that are too long cost less than a drift outside of them. It is sure below one case of 1000.
     """
@@ -142,8 +148,9 @@ def drift_modes(residuals: Array, slopes: Array, by_modes: Array) -> tuple[int, 
     for tried in range(1, by_modes.shape[1] // 3 + 1):
         if tried > modes + 2 or 3 * len(residuals) <= slopes.shape[1] + 3 * (tried + 1):
             break
-        noise = residual_noise(residuals, np.hstack([slopes, by_modes[:, : 3 * tried]]))
-        chance = noise.chance(3 * (tried - modes))
+        parameters, last = np.hstack([slopes, by_modes[:, : 3 * tried]]), 3 * (tried - modes)
+        by_joints = np.linalg.pinv(parameters)[-last:] @ carried
+        chance = residual_noise(residuals, parameters).chance(last, by_joints @ by_joints.T)
         if chance < _CHANCE:
             modes, sure = tried, sure or chance < _SURE
     return modes, sure

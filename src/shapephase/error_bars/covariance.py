@@ -24,6 +24,7 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
+from ._joint_noise import carried_by_knots
 from ._propagation import angle_bar, carried
 from .error_sources import InertiaErrors, Inputs, by_relative_errors, drawn_bodies, inputs_of
 from .forced_covariance import ForcedUncertainty, forced_uncertainty
@@ -246,11 +247,11 @@ def sampled_uncertainty(
     if inputs.samples is not None:
         samples, errors = path_samples(path), normal(inputs.samples)
         paths = [samples.path_through(samples.values + row.reshape(samples.values.shape)) for row in errors]
-        changes += errors @ samples.by_samples(_fit_by_knots(motion, inputs)).T
+        changes += errors @ samples.by_samples(moved_fit_by_knots(motion, inputs)).T
     if inputs.links is not None:
         errors = normal(inputs.links)
         bodies = drawn_bodies(body, wheels, errors)
-        changes += errors @ _fit_by_links(motion, inputs).T
+        changes += errors @ moved_fit_by_links(motion, inputs).T
     if inputs.attitude is not None:
         changes[:, :3] += normal(inputs.attitude)
     if inputs.momentum is not None:
@@ -260,7 +261,7 @@ def sampled_uncertainty(
     added = np.zeros((draws, len(wheels)))
     if inputs.rotors is not None:
         added = normal(inputs.rotors)
-        changes += added @ _fit_by_rotors(motion, inputs).T
+        changes += added @ moved_fit_by_rotors(motion, inputs).T
     starts, momenta = motion.initial_attitude @ so3.exp(changes[:, :3]), motion.momentum + changes[:, 3:]
     middle = split(motion)
     turns, phases = np.empty((len(_ROTATIONS), draws, 3)), np.empty((draws, len(_PHASES)))
@@ -322,7 +323,7 @@ def _causes(derived: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
         return _Cause(_combined(lambda pair: pair[0] + pair[1] @ start, derivative, by_start), start, covariance)
 
     if inputs.samples is not None:
-        samples, by_fit = path_samples(derived.path), _fit_by_knots(derived.motion, inputs)
+        samples, by_fit = path_samples(derived.path), moved_fit_by_knots(derived.motion, inputs)
         for rule in samples.rules:
             yield moving_the_fit(derived.at_knots(rule), rule(by_fit), inputs.samples)
         # The bias is one unknown of variance one, times its estimate.
@@ -331,7 +332,7 @@ def _causes(derived: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
     if inputs.links is not None:
         by_parameters = partial(by_relative_errors, derived.body, derived.rotors)
         by_links = _combined(lambda only: by_parameters(only[0]), derived.by_inertias)
-        yield moving_the_fit(by_links, _fit_by_links(derived.motion, inputs), inputs.links)
+        yield moving_the_fit(by_links, moved_fit_by_links(derived.motion, inputs), inputs.links)
     if inputs.momentum is not None:
         yield _Cause(derived.by_momentum, np.eye(UNKNOWNS)[:, 3:], inputs.momentum)
     if inputs.attitude is not None:
@@ -339,7 +340,7 @@ def _causes(derived: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
     if inputs.start is not None:
         yield _Cause(by_start, np.eye(UNKNOWNS), inputs.start)
     if inputs.rotors is not None:
-        yield moving_the_fit(derived.by_rotors, _fit_by_rotors(derived.motion, inputs), inputs.rotors)
+        yield moving_the_fit(derived.by_rotors, moved_fit_by_rotors(derived.motion, inputs), inputs.rotors)
 
 
 def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivative) -> ResultDerivative:
@@ -347,7 +348,22 @@ def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivati
     return ResultDerivative(*(rule(tuple(getattr(part, name) for part in parts)) for name in (*_ROTATIONS, *_PHASES)))
 
 
-def _fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
+def carried_errors(motion: Motion, inputs: Inputs, by_knots: Array, by_start: Array) -> Array:
+    """Covariance (r, r) of numbers with derivatives by the path at its knots (r, knots n) and by the start (r, 6).
+
+    By errors of the joints, of momentum and start, and of a fit that these move; others do not count.
+    """
+    total = np.zeros((len(by_start), len(by_start)))
+    if inputs.samples is not None:
+        moved = by_knots + by_start @ moved_fit_by_knots(motion, inputs)
+        total += carried_by_knots(path_samples(described_by(motion).path), moved, inputs.samples)
+    for columns, given in ((slice(3, 6), inputs.momentum), (slice(3), inputs.attitude), (slice(6), inputs.start)):
+        if given is not None:
+            total += carried(by_start[:, columns], given)
+    return total
+
+
+def moved_fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
     """Derivatives of fitted attitude and momentum at the start by the path at its knots: (6, knots n)."""
     if inputs.fit is None:
         path = described_by(motion).path
@@ -355,7 +371,7 @@ def _fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
     return fit_by_knots(motion, inputs.fit.times, inputs.fit.by_attitudes, inputs.fit.by_rates)
 
 
-def _fit_by_links(motion: Motion, inputs: Inputs) -> Array:
+def moved_fit_by_links(motion: Motion, inputs: Inputs) -> Array:
     """Derivatives of the fit by the relative errors of links."""
     assert inputs.links is not None
     if inputs.fit is None:
@@ -365,7 +381,7 @@ def _fit_by_links(motion: Motion, inputs: Inputs) -> Array:
     return by_relative_errors(described.body, described.rotors, by_parameters)
 
 
-def _fit_by_rotors(motion: Motion, inputs: Inputs) -> Array:
+def moved_fit_by_rotors(motion: Motion, inputs: Inputs) -> Array:
     """Derivatives of the fit by the wheels' values: (6, W)."""
     assert inputs.rotors is not None
     if inputs.fit is None:

@@ -17,16 +17,12 @@ from ..body.family import BodyFamily
 from ..deformation.rotors import Rotor
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
-from ..letters import value_text
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.files.labels import NO_UNIT, amounts
-from ..shape_space.path_samples import columns_without_samples, path_samples
-from ..shape_space.summaries import body_summary
+from ._joint_noise import covariance_argument, deviations_argument, sample_covariance
 from .recorded_momentum import UNKNOWNS, RecordedMomentum
 from .result_derivatives import described_by
 
-_NEGATIVE = 1e-9  # of the largest eigenvalue, for negative ones of a covariance: printed digits
 _OF_A_LINK = 5  # relative errors: of the mass, of the centre (3), of the inertia
 _LEAST_SHARE = 1e-3  # of its own mass and inertia that a link keeps in every draw
 
@@ -97,29 +93,7 @@ def inputs_of(
         check_object(inertias, "InertiaErrors", "inertias")
     if start is not None and not (momentum is None and attitude is None):
         raise ShapeError("start: it has the errors of momentum and attitude together; leave momentum and attitude out")
-    samples = None
-    if joints is not None:
-        spun = [wheel.joint for wheel in wheels]
-        driven = [column for column, name in enumerate(body.joint_names) if name not in spun]
-        if isinstance(joints, str):
-            # One amount of angles, of lengths, or both.
-            by_unit = amounts(joints, "joints")
-            summary = body_summary(body).joints
-            given = np.array([by_unit[summary[column].unit] for column in driven])
-        else:
-            given = finite_array(joints, "joints")
-        through = path_samples(path)
-        numbers = through.count * path.n_shape
-        if given.shape in ((), (path.n_shape,)):
-            deviations = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
-            if given.ndim == 0:
-                # The components of a quaternion change by half its turn.
-                deviations[np.array(body.joint_units, dtype=str)[driven] == NO_UNIT] *= 0.5
-            if given.ndim == 0 or isinstance(joints, str):
-                deviations[columns_without_samples(path)] = 0.0
-            samples = np.tile(deviations**2, through.count)
-        else:
-            samples = _covariance(given, "joints", numbers)
+    samples = None if joints is None else sample_covariance(body, path, wheels, joints)
     links = None if inertias is None else _link_variances(body, inertias)
     fit, together = None, None
     if isinstance(start, RecordedMomentum):
@@ -130,7 +104,7 @@ def inputs_of(
         ):
             raise ShapeError("start: this fit has another momentum or start than the motion; its own is fit.motion")
     elif start is not None:
-        together = _covariance(finite_array(start, "start"), "start", UNKNOWNS)
+        together = covariance_argument(finite_array(start, "start"), "start", UNKNOWNS)
     single = _of_vector(momentum, "momentum"), _of_vector(attitude, "attitude")
     of_rotors = None if rotors is None else _rotor_variances(wheels, rotors)
     return Inputs(samples, links, *single, start=together, rotors=of_rotors, fit=fit)
@@ -140,27 +114,7 @@ def _of_vector(given: ArrayLike | None, name: str) -> Array | None:
     if given is None:
         return None
     array = finite_array(given, name)
-    return _deviations(array, name) ** 2 * np.eye(3) if array.ndim == 0 else _covariance(array, name, 3)
-
-
-def _deviations(given: Array, name: str) -> Array:
-    if np.any(given < 0.0):
-        raise ShapeError(f"{name}: a standard deviation is not negative, got {value_text(given)}")
-    return given
-
-
-def _covariance(given: Array, name: str, numbers: int) -> Array:
-    if given.shape != (numbers, numbers):
-        raise ShapeError(
-            f"{name}: one standard deviation or a covariance ({numbers}, {numbers}) is needed, got {given.shape}"
-        )
-    scale = np.abs(given).max(initial=0.0)
-    if np.abs(given - given.T).max(initial=0.0) > _NEGATIVE * scale:
-        raise ShapeError(f"{name}: a covariance is symmetric")
-    least = np.linalg.eigvalsh(given)[0]
-    if least < -_NEGATIVE * scale:
-        raise ShapeError(f"{name}: a covariance has no negative eigenvalue, this one has {least:.3g}")
-    return 0.5 * (given + given.T)
+    return deviations_argument(array, name) ** 2 * np.eye(3) if array.ndim == 0 else covariance_argument(array, name, 3)
 
 
 def _link_variances(body: Body, errors: InertiaErrors) -> Array:
@@ -173,9 +127,11 @@ def _link_variances(body: Body, errors: InertiaErrors) -> Array:
                 if link not in body.chain.link_frames:
                     raise unknown_name(f"link of {body.name}", link, body.chain.link_frames)
                 frame, _ = body.chain.link_frames[link]
-                deviations[frame, columns] = _deviations(finite_array(deviation, f"{name} of link {link!r}", ()), name)
+                deviations[frame, columns] = deviations_argument(
+                    finite_array(deviation, f"{name} of link {link!r}", ()), name
+                )
         else:
-            deviations[:, columns] = _deviations(finite_array(given, name, ()), name)
+            deviations[:, columns] = deviations_argument(finite_array(given, name, ()), name)
     return (deviations**2).ravel()
 
 
@@ -185,12 +141,12 @@ def _rotor_variances(wheels: tuple[Rotor, ...], errors: float | Mapping[str, flo
     if not names:
         raise ShapeError("rotors: the motion has no wheels; name them in articulated(..., rotors=, rotor_speeds=)")
     if not isinstance(errors, Mapping):
-        return np.full(len(names), _deviations(finite_array(errors, "rotors", ()), "rotors") ** 2)
+        return np.full(len(names), deviations_argument(finite_array(errors, "rotors", ()), "rotors") ** 2)
     for joint in errors:
         if joint not in names:
             raise unknown_name("wheel of the motion", joint, names)
     given = [finite_array(errors.get(name, 0.0), f"rotors, {name}", ()) for name in names]
-    return _deviations(np.array(given), "rotors") ** 2
+    return deviations_argument(np.array(given), "rotors") ** 2
 
 
 def by_relative_errors(body: Body, wheels: tuple[Rotor, ...], derivative: Array) -> Array:

@@ -48,6 +48,7 @@ def motion_from_recording(
     rate: ArrayLike | None = None,
     rate_time: float = 0.0,
     attitude: ArrayLike | None = None,
+    joints: ArrayLike | str | None = None,
     tolerance: float = 1e-9,
     find_axes: bool = False,
     progress: ProgressCallback | None = None,
@@ -68,6 +69,7 @@ def motion_from_recording(
     rate_time : that time, since the first sample kept [s]
     attitude : (3, 3) or quaternion (4,) x y z w of the start, beside a momentum or rate, or of rates without attitudes;
         None: as recorded, or the identity
+    joints : noise of the recorded joints for the fit, as for `uncertainty`; None: that of their smoothing, if any
     tolerance : of the attitude [rad]
     find_axes : as for `momentum_from_recording`
     progress : called while it is reconstructed
@@ -115,7 +117,9 @@ def motion_from_recording(
                 "the attitude at the start is fitted to the recorded base, with the momentum; leave it out "
                 "(--attitude), or give the momentum, too (--momentum)"
             )
-        fitted = _fit(deformation, recorded, attitude, tolerance, find_axes=find_axes)
+        if joints is None and recorded.smoothing is not None:
+            joints = recorded.smoothing.noise
+        fitted = _fit(deformation, recorded, attitude, joints, tolerance, find_axes=find_axes)
         return RecordedFlight(fitted.motion, "fit", fitted)
     if find_axes:
         raise ShapeError(
@@ -135,6 +139,7 @@ def _fit(
     deformation: Deformation,
     recorded: RecordedMotion,
     attitude: ArrayLike | None,
+    joints: ArrayLike | str | None,
     tolerance: float,
     *,
     find_axes: bool,
@@ -150,6 +155,7 @@ def _fit(
                 recorded.base_attitude,
                 rates=recorded.base_rates,
                 attitude=start,
+                joints=joints,
                 tolerance=tolerance,
                 find_axes=find_axes,
             )

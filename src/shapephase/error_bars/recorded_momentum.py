@@ -17,9 +17,12 @@ from ..display import frozen
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion
 from ..reconstruction.recorded_base import INVERSE, W_FIRST, read_w_first
+from ..shape_space.path_samples import path_samples
 from ._along_motion import legendre
 from ._flight_fit import UNKNOWNS, Fitted, FlightFit, check_near, flight_fitted, from_few, size
+from ._joint_noise import carried_by_knots, sample_covariance
 from ._residual_noise import drift_modes, held, independent, residual_noise
+from .result_derivatives import deformation_parts, fit_by_knots
 
 _VAGUE_BIAS = 0.1  # of the rates: a bias that is less certain is not fitted to rates alone
 _WEIGHINGS = 3  # of attitudes against rates: the third changes their noise by less than 1e-3
@@ -102,6 +105,7 @@ def momentum_from_recording(
     noise: float | None = None,
     rate_noise: float | None = None,
     find_bias: bool | None = None,
+    joints: ArrayLike | str | None = None,
     tolerance: float = 1e-8,
     find_axes: bool = False,
 ) -> RecordedMomentum:
@@ -123,6 +127,8 @@ def momentum_from_recording(
     rate_noise : standard deviation of each component of a recorded rate [rad/s]; None: what the fit leaves
     find_bias : True to fit a constant bias of the rates, False to take it for zero; None: it is fitted beside
         attitudes, and to rates alone where these determine it to a tenth of themselves
+    joints : noise of the samples that the path of the joints is made of, as for `uncertainty`: what it turns the
+        reconstruction by grows in time, and is not taken for a momentum that changes; None: none is known
     tolerance : of the reconstruction [rad]
     find_axes : whether the attitudes are those of axes that are fixed to the base in an unknown way, which is fitted
         too: from the way on with which the momentum, roughly, stays most constant
@@ -131,6 +137,8 @@ def momentum_from_recording(
     ------
     ShapeError
         If the shapes disagree; for rates beside axes to be found, and arguments without what they belong to.
+    WrongObjectError
+        With `joints`, if the deformation is not of an articulated body along a path through samples.
     TrajectoryError
         If there are fewer than three times, or they do not ascend; or if the attitudes are a flight only once their
         quaternions are read with w first, or as their inverse, or the rates once they are read in deg/s; or if by the
@@ -148,7 +156,8 @@ def momentum_from_recording(
     Notes
     -----
     Noise that is correlated in time, as trackers and filters leave it, makes the bars longer, by an autoregressive
-    process whose correlation is not known either. Equation :eq:`moved-fit` of the documentation.
+    process whose correlation is not known either. Equations :eq:`moved-fit` and :eq:`drift-of-joints` of the
+    documentation.
     Source: theory.md section 8 (the response of the attitude to start and momentum).
 
     Examples
@@ -182,6 +191,10 @@ def momentum_from_recording(
             raise ShapeError(f"rates: ({len(at)}, 3), one for each time, are needed, got {measured.shape}")
         _check_speed(at, measured)
     _check_choices(recorded, measured, noise, rate_noise, attitude, find_bias=find_bias, find_axes=find_axes)
+    joint_noise = None
+    if joints is not None:
+        body, path, _, wheels = deformation_parts(deformation)
+        joint_noise = sample_covariance(body, path, wheels, joints)
     least = FlightFit(deformation, at, recorded, tolerance)
     if recorded is None:
         assert measured is not None
@@ -195,7 +208,7 @@ def momentum_from_recording(
         least = replace(least, find_axes=find_axes)
         if measured is not None:
             least, fit = _weighed(replace(least, find_bias=find_bias is not False), fit, measured, noise, rate_noise)
-    result = _estimated(least, fit, noise, rate_noise)
+    result = _estimated(least, fit, noise, rate_noise, joint_noise)
     if measured is None and not find_axes:
         _check_readings(least, _RIGHT * size(fit.residuals))
     if not result.conserved:
@@ -338,7 +351,9 @@ def _left(residuals: Array, slopes: Array, estimator: Array) -> float:
     return float(np.sqrt((residuals**2).sum() / max(len(residuals) - np.einsum("am,ma->", slopes, estimator), 1.0)))
 
 
-def _estimated(least: FlightFit, fit: Fitted, noise: float | None, rate_noise: float | None) -> RecordedMomentum:
+def _estimated(
+    least: FlightFit, fit: Fitted, noise: float | None, rate_noise: float | None, joint_noise: Array | None
+) -> RecordedMomentum:
     """The fit with the noise and the change of the momentum that its residuals show."""
     motion, times, tolerance = fit.state.motion, least.times, least.tolerance
     estimator = _inverse(fit.slopes)
@@ -350,7 +365,10 @@ def _estimated(least: FlightFit, fit: Fitted, noise: float | None, rate_noise: f
     # Residuals near the tolerance of the reconstruction are rounding.
     if size(residuals) > _ROUNDED * tolerance:
         by_modes = least.slopes_by_modes(motion)
-        modes, sure = drift_modes(residuals, slopes, by_modes)
+        by_joints = np.zeros((residuals.size, 0))
+        if joint_noise is not None:
+            by_joints = _carried_noise(least, motion, independent(np.hstack([slopes, by_modes])), joint_noise)
+        modes, sure = drift_modes(residuals, slopes, by_modes, by_joints)
     covariance = np.zeros((len(estimator), len(estimator)))
     white_covariance = covariance.copy()
     stated_covariance = covariance.copy()
@@ -385,16 +403,7 @@ def _estimated(least: FlightFit, fit: Fitted, noise: float | None, rate_noise: f
         turning = np.linalg.norm(motion.momentum) + np.sqrt((carried**2).sum(axis=1).mean())
         conserved = not sure or bool(np.linalg.norm(deviations, axis=1).max() <= _CONSTANT * turning)
     covariance = np.pad(covariance, ((fixed, 0), (fixed, 0)))
-    by_all = np.pad(estimator, ((fixed, 0), (0, 0)))[:UNKNOWNS]
-    by_attitudes, by_rates = np.zeros((2, UNKNOWNS, 3 * count))
-    if least.recorded is not None:
-        by_attitudes = by_all[:, : 3 * count]
-    if least.rates is not None:
-        by_rates = least.weight * by_all[:, -3 * count :]
-        turned = least.rates_by_turns(motion)
-        by_attitudes = by_attitudes + np.einsum("pni,nij->pnj", by_rates.reshape(UNKNOWNS, count, 3), turned).reshape(
-            UNKNOWNS, -1
-        )
+    by_attitudes, by_rates = _by_recorded(least, motion, np.pad(estimator, ((fixed, 0), (0, 0)))[:UNKNOWNS])
     extra = covariance[UNKNOWNS:, UNKNOWNS:]
     return RecordedMomentum(
         momentum=motion.momentum,
@@ -419,6 +428,30 @@ def _estimated(least: FlightFit, fit: Fitted, noise: float | None, rate_noise: f
         bias=fit.state.bias,
         bias_covariance=extra if least.find_bias else None,
     )
+
+
+def _by_recorded(least: FlightFit, motion: Motion, by_residuals: Array) -> tuple[Array, Array]:
+    """Derivatives by turns of the attitudes and by the rates, (m, 3 N) each, of those by the residuals (m, 3 K)."""
+    count = 3 * len(least.times)
+    by_attitudes, by_rates = np.zeros((2, len(by_residuals), count))
+    if least.recorded is not None:
+        by_attitudes = by_residuals[:, :count]
+    if least.rates is not None:
+        by_rates = least.weight * by_residuals[:, -count:]
+        by_turns = by_rates.reshape(len(by_rates), -1, 1, 3) @ least.rates_by_turns(motion)
+        by_attitudes = by_attitudes + by_turns.reshape(by_rates.shape)
+    return by_attitudes, by_rates
+
+
+def _carried_noise(least: FlightFit, motion: Motion, columns: Array, noise: Array) -> Array:
+    """Turns of the first recorded quantity by noise of the joints' samples, as far as orthonormal columns (3 N, c)
+    hold them: (3 N, c), for c independent numbers of variance one."""
+    others = 3 * len(least.times) * (least.recorded is not None and least.rates is not None)
+    by_attitudes, by_rates = _by_recorded(least, motion, np.pad(columns.T, ((0, 0), (0, others))))
+    by_knots = fit_by_knots(motion, least.times, by_attitudes, by_rates)
+    samples = path_samples(deformation_parts(motion.deformation).path)
+    values, axes = np.linalg.eigh(carried_by_knots(samples, by_knots, noise))
+    return columns @ (axes * np.sqrt(np.maximum(values, 0.0)))
 
 
 def warn_of_drift(fit: RecordedMomentum) -> None:

@@ -13,6 +13,7 @@ from .. import so3
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription
 from ..deformation.rotors import Rotor, RotorDescription
 from ..display import frozen
@@ -300,7 +301,12 @@ def described_by(motion: Motion | ForcedMotion) -> Described:
         check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"derivatives are those of one motion, this is a batch of {motion.batch}; reconstruct one")
-    description = motion.deformation.description
+    return deformation_parts(motion.deformation)
+
+
+def deformation_parts(deformation: Deformation) -> Described:
+    """What a deformation is made of. Raises WrongObjectError where it is not that of a body with joints."""
+    description = deformation.description
     if isinstance(description, RotorDescription):
         return Described(description.platform, description.driven_path, description.route, description.rotors)
     if not isinstance(description, ArticulatedDescription):
@@ -369,3 +375,22 @@ def _by_added_momentum(motion: Motion, times: Array, by_attitudes: Array) -> tup
     carried = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse
     rows = along.weights[:, None, None] * (later[np.searchsorted(times, along.times)] @ carried)
     return described.at(along.times, along.shapes, along.rates), along, rows
+
+
+def turns_by_start(motion: Motion, times: Array) -> Array:
+    """Derivatives of the attitude's turns at N times, base axes, by turn of the start and momentum: (3 N, 6)."""
+    turned = so3.transpose(motion.attitude(times)) @ responses(motion, times)
+    turned[:, :, :3] = turned[:, :, :3] @ motion.initial_attitude
+    return turned.reshape(-1, turned.shape[2])
+
+
+def turns_by_shapes(motion: Motion, times: Array, by_turns: Array) -> tuple[Array, Array, Array]:
+    """Derivatives of numbers that depend on attitudes, by shapes and rates of joints that are no wheels, at M nodes.
+
+    by_turns : (r, 3 N) of the numbers by turns of the attitudes at N times, base axes
+
+    Returns the times of the nodes (M,) and both, (M, r, n), to be summed over the nodes.
+    """
+    # A change that turns the attitudes moves a fit to them as their turns backwards do.
+    body_along, along, rows = _by_added_momentum(motion, times, -by_turns)
+    return along.times, *body_along.by_shapes(along.spins[:, None], rows[:, None])

@@ -14,7 +14,7 @@ from ..arrays import Array
 from ..display import short_repr
 from ..errors import ChartPoleError, ShapeError
 from ..reconstruction import AthleteAxes
-from ..reconstruction.attitude_angles import athlete_slopes
+from ..reconstruction.attitude_angles import athlete_slopes, tilt_and_twist
 from ..reconstruction.reconstruction import Motion
 from ..refinement import least_over
 from .phase_split import PhaseSplit
@@ -255,13 +255,12 @@ def count_slopes(motion: Motion) -> Array | None:
     axes = motion.counted_axes()
     if axes is None:
         return None
-    known = {name: getattr(axes, name) for name in ("lateral", "longitudinal", "somersault", "up")}
-    _, tilt, twist = motion.somersault_tilt_twist([0.0, motion.duration], **known)
+    space, body = axes.matrices
     try:
-        slopes = athlete_slopes(tilt, twist)
+        slopes = athlete_slopes(*tilt_and_twist(space.T @ motion.attitude([0.0, motion.duration]) @ body))
     except ChartPoleError:
         return None
-    first, last = slopes[:, [0, 2]] @ axes.matrices[1].T / _TURN
+    first, last = slopes[:, [0, 2]] @ body.T / _TURN
     return np.hstack([last @ motion.final_attitude.T, -first])
 
 

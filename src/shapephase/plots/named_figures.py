@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..arguments import check_choice, check_file_name, check_object
 from ..body.body import Body
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SHOWN_PER_INCH = 130.0  # pixels in a notebook
+_EXACT: Mapping[str, Any] = {}  # errors of inputs that have none
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,13 @@ class Figure:
     ----------
     caption : one line
     height : [in]
-    draw : function of axes, motion, path of the joints and gauge
+    draw : function of axes, motion, path of the joints, gauge and errors of the inputs by name
     with_momentum, with_path : whether it needs a momentum, a path of the joints
     of_change : whether it shows nothing but zero of a rigid body
     of_loop : whether it needs a path that closes
     in_report : whether a report has it
     of_athlete : whether a report has it only of a person or an animal whose somersaults are counted
+    with_errors : whether it has bars for errors of the inputs
 
     Examples
     --------
@@ -62,13 +64,14 @@ class Figure:
 
     caption: str
     height: float
-    draw: Callable[[Axes, Motion, ShapePath | None, Gauge], object]
+    draw: Callable[[Axes, Motion, ShapePath | None, Gauge, Mapping[str, Any]], object]
     with_momentum: bool = False
     with_path: bool = False
     of_change: bool = False
     of_loop: bool = False
     in_report: bool = True
     of_athlete: bool = False
+    with_errors: bool = False
 
     __repr__ = short_repr
 
@@ -98,20 +101,24 @@ def _body_of(motion: Motion, kind: str) -> Body:
 
 FIGURES: Mapping[str, Figure] = {
     "somersault": Figure(
-        "Somersault, tilt and twist", 2.8, lambda ax, motion, *_: plot_somersault(ax, motion), of_athlete=True
+        "Somersault, tilt and twist",
+        2.8,
+        lambda ax, motion, _, __, errors: plot_somersault(ax, motion, **errors),
+        of_athlete=True,
+        with_errors=True,
     ),
     "momentum": Figure(
         "The momentum in the frame of the gauge, and the area it encloses",
         3.9,
-        lambda ax, motion, _, gauge: plot_momentum_curve(ax, motion, gauge),
+        lambda ax, motion, _, gauge, *__: plot_momentum_curve(ax, motion, gauge),
         with_momentum=True,
     ),
     "phases": Figure(
-        "The phases in time", 2.8, lambda ax, motion, _, gauge: plot_phases(ax, motion, gauge), with_momentum=True
+        "The phases in time", 2.8, lambda ax, motion, _, gauge, *__: plot_phases(ax, motion, gauge), with_momentum=True
     ),
     "attitude": Figure("The attitude as a rotation vector", 2.8, lambda ax, motion, *_: plot_attitude(ax, motion)),
     "shape": Figure(
-        "The joints", 2.8, lambda ax, motion, path, _: _draw_shape(ax, motion, path), with_path=True, of_change=True
+        "The joints", 2.8, lambda ax, motion, path, *_: _draw_shape(ax, motion, path), with_path=True, of_change=True
     ),
     "torques": Figure(
         "The torques of the joints", 2.8, lambda ax, motion, *_: plot_torques(ax, motion), with_path=True
@@ -131,14 +138,14 @@ FIGURES: Mapping[str, Figure] = {
     "loop": Figure(
         "The loop of the joints on the curvature, and the parts of the turn by shape",
         LOOP_HEIGHT,
-        lambda ax, motion, path, _: plot_loop(ax, _body_of(motion, "loop"), _joints_of(path, "loop")),
+        lambda ax, motion, path, *_: plot_loop(ax, _body_of(motion, "loop"), _joints_of(path, "loop")),
         with_path=True,
         of_loop=True,
     ),
     "curvature": Figure(
         "The curvature over the two joints whose loop encloses most",
         2.8,
-        lambda ax, motion, path, _: _draw_curvature(ax, motion, path),
+        lambda ax, motion, path, *_: _draw_curvature(ax, motion, path),
         with_path=True,
         in_report=False,
     ),
@@ -184,7 +191,7 @@ def motion_figure(
     check_object(motion, "Motion", "motion")
     named = kind or ("phases" if motion.momentum.any() else "attitude")
     axes = column_axes(_figure_of(named, motion).height) if ax is None else ax
-    FIGURES[named].draw(axes, motion, getattr(motion.deformation.description, "path", None), gauge)
+    FIGURES[named].draw(axes, motion, getattr(motion.deformation.description, "path", None), gauge, {})
     if ax is None:
         axes._repr_png_ = partial(axes_image, axes, "png", _SHOWN_PER_INCH)  # type: ignore[attr-defined]
     return axes
@@ -199,13 +206,19 @@ def _figure_of(kind: str, motion: Motion) -> Figure:
 
 
 def figure_image(
-    kind: str, motion: Motion, path: ShapePath | None = None, gauge: Gauge = "horizontal", *, ending: str = "svg"
+    kind: str,
+    motion: Motion,
+    path: ShapePath | None = None,
+    gauge: Gauge = "horizontal",
+    *,
+    ending: str = "svg",
+    errors: Mapping[str, Any] = _EXACT,
 ) -> bytes:
     """Return one of `FIGURES` as an image: "svg", "pdf" or "png"."""
     figure = _figure_of(kind, motion)
     check_choice(ending, "kind of image", ("svg", "pdf", "png"))
     ax = column_axes(figure.height)
-    figure.draw(ax, motion, path, gauge)
+    figure.draw(ax, motion, path, gauge, errors)
     return axes_image(ax, ending)
 
 
@@ -215,19 +228,23 @@ def write_figure(
     out: str | os.PathLike[str],
     path: ShapePath | str | None = None,
     gauge: Gauge = "horizontal",
+    *,
+    errors: Mapping[str, Any] | None = None,
 ) -> None:
     """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all.
 
     Parameters
     ----------
     path : of the joints, for "shape"
+    errors : of the inputs by name, as for `uncertainty`, for "somersault"; None: no error bars
 
     Raises
     ------
     UnknownNameError
         For another kind, or another ending.
     ShapeError
-        For a kind that needs a momentum or a path, if there is none; or if the motion is a batch.
+        For a kind that needs a momentum or a path, if there is none; for errors of another kind; or if the motion is a
+        batch.
     MissingExtraError
         Without Matplotlib.
 
@@ -243,7 +260,13 @@ def write_figure(
     check_file_name(out, "out")
     if path is not None:
         path = as_path(path)
-    image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix(".").lower())
+    if errors and not _figure_of(kind, motion).with_errors:
+        shown = ", ".join(name for name, figure in FIGURES.items() if figure.with_errors)
+        raise ShapeError(
+            f"errors: the figure {kind!r} has no error bars; leave them out, or take one that has: {shown}"
+        )
+    ending = Path(out).suffix.removeprefix(".").lower()
+    image = figure_image(kind, motion, path, gauge, ending=ending, errors=errors or _EXACT)
     write_whole(out, lambda stream: stream.write(image))
 
 

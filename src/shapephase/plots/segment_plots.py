@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arguments import check_choice, check_object
+from ..arguments import check_choice, check_keywords, check_object
 from ..arrays import Array
+from ..error_bars.angles_in_time import somersault_bars
 from ..errors import WrongObjectError
 from ..reconstruction.reconstruction import Motion
 from ..segments.limb_contributions import Contributions
@@ -44,6 +45,8 @@ _SOURCES = (BLUE, ORANGE, GREEN, SKY, VERMILION, PURPLE)
 _BAR = 0.4  # height of a bar: two for each group, and a gap
 _LINE = 0.32  # [in] height of a group in the figure: two bars and two lines of small letters
 _HEAD = 1.1  # [in] of legend and axis
+_TIMES_OF_BARS = 61  # between which error bars are drawn straight: fewer miss how those of a twist grow in a somersault
+_ERRORS = ("joints", "inertias", "momentum", "attitude", "start", "rotors")
 
 
 def plot_segment_momentum(ax: Axes, momentum: SegmentMomentum, axis: str | None = None) -> Axes:
@@ -109,14 +112,18 @@ def plot_segment_momentum(ax: Axes, momentum: SegmentMomentum, axis: str | None 
     return ax
 
 
-def plot_somersault(ax: Axes, motion: Motion, *, times: Array | None = None) -> Axes:
-    """Draw somersault, tilt and twist in degrees, with bands of the numerical error where that is seen.
+def plot_somersault(ax: Axes, motion: Motion, *, times: Array | None = None, **errors: Any) -> Axes:
+    """Draw somersault, tilt and twist in degrees, with bands of the error where that is seen.
+
+    Without errors of the inputs the bands are those of the numerical error; with them two standard deviations, whose
+    largest the legend states.
 
     Parameters
     ----------
     ax : flat axes
     motion : of an athlete, no batch; axes as by `Motion.athlete_axes`
     times : (N,) where to draw [s]; None: several in each step of the integrator
+    errors : joints, inertias, momentum, attitude, start or rotors, as for `error_bars.somersault_bars`
 
     Examples
     --------
@@ -127,20 +134,29 @@ def plot_somersault(ax: Axes, motion: Motion, *, times: Array | None = None) -> 
     ['somersault', 'tilt', 'twist']
     """
     check_object(motion, "Motion", "motion")
+    check_keywords(errors, plot_somersault, _ERRORS)
     check_flat_axes(ax)
     one_motion(motion)
     t = motion_times(motion, times)
-    angles, errors = motion.somersault_tilt_twist(t), motion.somersault_errors(t)
-    for name, angle, error, style in zip(("somersault", "tilt", "twist"), angles, errors, SERIES, strict=False):
-        ax.fill_between(t, angle - error, angle + error, color=style["color"], alpha=0.3, linewidth=0.0)
+    angles, widths = motion.somersault_tilt_twist(t), motion.somersault_errors(t)
+    names = ["somersault", "tilt", "twist"]
+    if errors:
+        known = np.linspace(t[0], t[-1], _TIMES_OF_BARS)
+        bars = somersault_bars(motion, known, **errors)
+        widths = tuple(2.0 * np.interp(t, known, bar) for bar in bars)
+        names = [f"{name} ± {np.degrees(width.max()):.2g}°" for name, width in zip(names, widths, strict=True)]
+    for name, angle, width, style in zip(names, angles, widths, SERIES, strict=False):
+        ax.fill_between(t, angle - width, angle + width, color=style["color"], alpha=0.3, linewidth=0.0)
         ax.plot(t, angle, label=name, **style)
-    in_time(ax, (t[0], t[-1]), "[rad]")
+    in_time(ax, (t[0], t[-1]), "[rad]", title="± 2 standard deviations, at most" if errors else None)
     degrees_first(ax, "angle", radians=False)
     return ax
 
 
 def plot_shares(ax: Axes, shares: Contributions) -> Axes:
     """Draw for each group what it adds on average (Shapley), and what is lost with it on the baseline.
+
+    Error bars are those of a recording's noise, one standard deviation, else the numerical errors.
 
     Parameters
     ----------
@@ -158,10 +174,13 @@ def plot_shares(ax: Axes, shares: Contributions) -> Axes:
     check_object(shares, "Contributions", "shares")
     check_flat_axes(ax)
     names, places = list(shares.groups), np.arange(len(shares.groups))
-    lost = shares.whole - shares.without[: len(names)]
+    lost, bars = shares.whole - shares.without[: len(names)], shares.bars
+    of_shared, of_lost = shares.errors, np.full(len(names), shares.error)
+    if bars is not None:
+        of_shared, of_lost = bars.shared[: len(names)], bars.lost[: len(names)]
     for values, errors, offset, colour, text in (
-        (shares.shared, shares.errors, -0.5, BLUE, "shared: average over all orders"),
-        (lost, np.full(len(names), shares.error), 0.5, ORANGE, "lost when held"),
+        (shares.shared, of_shared, -0.5, BLUE, "shared: average over all orders"),
+        (lost, of_lost, 0.5, ORANGE, "lost when held"),
     ):
         ax.barh(places + offset * _BAR, values / shares.scale, _BAR, color=colour, label=text,
                 xerr=errors / shares.scale, error_kw={"elinewidth": 0.8, "capsize": 1.5})  # fmt: skip

@@ -227,6 +227,17 @@ def athlete_slopes(tilt: Array, twist: Array) -> Array:
     return np.stack([turning, np.stack([cosine, -sine, zero], axis=-1), along], axis=-2)
 
 
+def tilt_and_twist(seen: Array) -> tuple[Array, Array]:
+    """Tilt and twist of attitudes from an athlete's axes in the body to those in space: (..., 3, 3) -> (...) each.
+
+    The tilt is within a quarter of a turn, which leaves what `athlete_slopes` gives for somersault and twist as it is.
+    """
+    return (
+        np.arctan2(-seen[..., 1, 2], np.hypot(seen[..., 1, 0], seen[..., 1, 1])),
+        np.arctan2(seen[..., 1, 0], seen[..., 1, 1]),
+    )
+
+
 def euler_chart(sequence: str) -> EulerAngles:
     """Return the chart of a sequence. Raises UnknownNameError for an invalid sequence."""
     axes = sequence.lower() if isinstance(sequence, str) else ""

@@ -3,6 +3,7 @@ from .direct_shares import DirectShares
 from .limb_contributions import Contributions, contributions
 from .limbs import JointGroups, joint_groups
 from .momentum import FlightMomentum, Normalisation, SegmentMomentum, segment_momentum
+from .share_bars import ShareBars
 
 __all__ = [
     "Contributions",
@@ -11,6 +12,7 @@ __all__ = [
     "JointGroups",
     "Normalisation",
     "SegmentMomentum",
+    "ShareBars",
     "contributions",
     "joint_groups",
     "segment_momentum",

@@ -22,7 +22,8 @@ from .direct_shares import articulated_parts, rotors_of
 from .limbs import WHEELS
 
 MIRRORED = "mirrored"
-BASELINES = ("first", "neutral", MIRRORED)
+POSTURES = ("first", "neutral")
+BASELINES = (*POSTURES, MIRRORED)
 _SAME = 1e-9  # relative difference of two trials that counts as none: files are written with ten digits or more
 _FRACTIONS = np.linspace(0.0, 1.0, 257)  # of the duration, at which joints and wheels of two trials are compared
 
@@ -79,6 +80,7 @@ class HeldMotions:
         rest: Iterable[str],
     ) -> None:
         self.motion, self._other = motion, motion
+        self.at_first_posture = isinstance(baseline, str) and baseline == "first"
         self.body, path = articulated_parts(motion.deformation)
         self._paths = path, _still_path(self.body, path, baseline)
         wheels = rotors_of(motion.deformation)
@@ -177,6 +179,14 @@ class HeldMotions:
             for mask in sorted(subsets)
         }
 
+    def own_columns(self, subset: int) -> Mask:
+        """True for columns of the shape that follow the motion in a subset, not the baseline: (n,)."""
+        own = np.zeros(self.body.n_shape, dtype=bool)
+        own[self._shared] = True
+        for place, columns in enumerate(self.columns.values()):
+            own[list(columns)] |= bool(subset >> place & 1)
+        return own
+
     def _source(self, name: str, subset: int) -> Motion:
         """The motion that has a condition in a subset: this one, or the baseline."""
         is_own = name not in self.conditions or bool(subset >> self.names.index(name) & 1)
@@ -196,11 +206,7 @@ class HeldMotions:
             )
             # Both ends of the breaks are the same number.
             breaks, loops = np.union1d(moving.breaks, np.append(baseline.breaks[:-1], moving.duration)), 1
-        own = np.zeros(body.n_shape, dtype=bool)
-        own[self._shared] = True
-        for place, columns in enumerate(self.columns.values()):
-            own[list(columns)] |= bool(mask >> place & 1)
-        curve = _Mixed(moving.curve, baseline.curve, own)
+        curve = _Mixed(moving.curve, baseline.curve, self.own_columns(mask))
         path = replace(moving, curve=curve, breaks=breaks, loops=loops, origin=None)
         has_own_wheels = WHEELS not in self.conditions or bool(mask >> self.names.index(WHEELS) & 1)
         return deformation_along(body, path, _wheels_of(body, self._rotors[not has_own_wheels], path.duration))

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_keywords, check_object, number_argument, times_argument, vector_argument, whole_argument
-from ..arrays import Array, read_only
+from ..arrays import Array, Integers, read_only
 from ..body.body import Body
 from ..display import frozen, number_with_bar
+from ..error_bars.error_sources import Inputs, inputs_of
+from ..error_bars.recorded_momentum import RecordedMomentum
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..letters import value_text
 from ..phases.phases import split
@@ -37,6 +39,7 @@ from .direct_shares import (
 from .held_motions import MIRRORED, HeldMotions
 from .limbs import CONDITIONS, WHEELS, JointGroups, SegmentTree, joint_groups
 from .mirrored_motion import mirrored_motion
+from .share_bars import ShareBars, result_covariance
 
 MOST_EXACT = 10  # groups of which all subsets are computed: 1,024 motions
 _ROWS = 201  # times of the direct shares, as many as of other tables
@@ -67,6 +70,7 @@ class Contributions:
     error : estimate of the error of `whole`, and of each held motion at most
     steep : groups that move in those motions whose tilt passes 85 degrees, where counts lose their meaning
     direct : what momentum and joints did along the motion; None for results without rates
+    bars : by the noise of the recording; None where none is stated
 
     Examples
     --------
@@ -97,6 +101,7 @@ class Contributions:
     error: float
     steep: tuple[str, ...]
     direct: DirectShares | None
+    bars: ShareBars | None = None
     _pairs: dict[str, tuple[str, str]] = field(repr=False, default_factory=dict)
     _held: HeldMotions | None = field(repr=False, default=None)
 
@@ -132,14 +137,24 @@ class Contributions:
         return f"{round(value / self.scale, 3) + 0.0:.3f}"
 
     def rows(self) -> list[tuple[str, str, str, str]]:
-        """Return the rows of the table: name, result without the group, result with it alone, shared."""
-        shares = dict(zip(self.groups, zip(self.shared, self.errors, strict=True), strict=True))
-        rows = []
-        for name, without, alone in zip(self.held_names, self.without, self.alone, strict=True):
-            pair = self._pairs.get(name)
-            share, bar = shares[name] if pair is None else (sum(shares[n][0] for n in pair), 0.0)
-            rows.append((name, self.text(without), self.text(alone), self.text(share, bar)))
-        return [*rows, ("all groups", self.text(self.none), self.text(self.whole), self.text(self.shared.sum()))]
+        """Return the rows of the table: name, result without the group, result with it alone, shared.
+
+        With bars of the noise where they are known, else shares of sampled orders with their standard errors.
+        """
+        shares, text = dict(zip(self.groups, self.shared, strict=True)), self.text
+        shared = [sum(shares[member] for member in self._pairs.get(name, (name,))) for name in self.held_names]
+        values = np.array([self.without, self.alone, shared])
+        bars, ends = np.zeros_like(values), (0.0, 0.0, 0.0)
+        bars[2, : len(shares)] = self.errors
+        if self.bars is not None:
+            bars, ends = np.array([self.bars.without, self.bars.alone, self.bars.shared]), self.bars.ends
+        names, values = [*self.held_names, "all groups"], [*values.T, (self.none, self.whole, self.shared.sum())]
+        return [
+            (name, text(held, of_held), text(alone, of_alone), text(share, of_share))
+            for name, (held, alone, share), (of_held, of_alone, of_share) in zip(
+                names, values, [*bars.T, ends], strict=True
+            )
+        ]
 
     def direct_rows(self) -> list[tuple[str, str]]:
         """Return sources of the direct shares that did something, the largest first, with their totals."""
@@ -156,13 +171,17 @@ class Contributions:
         when = f" at {self.at:.4g} s" if self.of == "tilt" else ""
         unit = f" [{self.unit}]" if self.unit else ""
         error = f"numerical error {self.error / self.scale:.0e}"
+        *_, (_, none, whole, _) = rows = self.rows()
+        columns = 20 if self.bars is not None else 12
         lines = [
-            f"{self.of}{when} of {self.link}{unit}: {text(self.whole)} ({error}); with all groups {self.baseline} "
-            f"{text(self.none)}",
+            f"{self.of}{when} of {self.link}{unit}: {whole} ({error}); with all groups {self.baseline} {none}",
             "",
-            f"{'':{wide}}{'held':>12}{'alone':>12}{'shared':>18}",
-        ]  # fmt: skip
-        lines += [f"{name:{wide}}{held:>12}{alone:>12}{shared:>18}" for name, held, alone, shared in self.rows()]
+            f"{'':{wide}}{'held':>{columns}}{'alone':>{columns}}{'shared':>{columns + 6}}",
+        ]
+        lines += [
+            f"{name:{wide}}{held:>{columns}}{alone:>{columns}}{shared:>{columns + 6}}"
+            for name, held, alone, shared in rows
+        ]
         if self.interactions is not None and len(self.groups) > 1:
             small = self.small_loop
             lines += ["", "pairs, beyond what both do alone" + ("" if small is None else "; what small loops tend to")]
@@ -191,6 +210,8 @@ class Contributions:
         ['in no group, moving in all motions: waist_yaw, waist_roll']
         """
         notes = [f"in no group, moving in all motions: {', '.join(self.rest)}"] if self.rest else []
+        if self.bars is not None:
+            notes.append("±: one standard deviation by the noise of the recording, to first order")
         if self.steep:
             notes.append(f"tilt beyond 85 deg, counts without meaning, in motions of: {'; '.join(self.steep)}")
         if self.of == "phase" and np.ptp([self.whole, self.none, *self.without, *self.alone]) > np.pi:
@@ -242,6 +263,8 @@ def contributions(
     times: ArrayLike | None = None,
     orders: int = 200,
     seed: int = 0,
+    joints: ArrayLike | str | None = None,
+    start: RecordedMomentum | ArrayLike | None = None,
     **axes: Any,
 ) -> Contributions:
     """Return the shares of limbs in a twist, tilt, somersault or another result of a motion, in three exact readings.
@@ -267,12 +290,15 @@ def contributions(
     link : whose angles; None: the trunk
     times : (N,) of the direct shares [s]; None: 201 even ones
     orders, seed : of random orders of groups, for more than 10 groups
+    joints, start : errors of the samples of joints, and of momentum and attitude at the start, as for `uncertainty`:
+        twist, tilt and somersault against a posture then have error bars, to first order
     axes : lateral, longitudinal (axes of the link), somersault, up, as for `Motion.athlete_axes`
 
     Raises
     ------
     WrongObjectError, UnknownNameError, ShapeError
-        For another kind of motion, an unknown word, a joint in two groups, or a difference of two motions in no group.
+        For another kind of motion, an unknown word, a joint in two groups, or a difference of two motions in no group;
+        for errors beside a result or a baseline without bars, and as `uncertainty` raises.
     ChartPoleError
         If the tilt of the motion passes 85 degrees and `of` is one of the three angles.
 
@@ -292,6 +318,13 @@ def contributions(
     check_keywords(axes, contributions, ("lateral", "longitudinal", "somersault", "up"))
     if motion.batch:
         raise ShapeError(f"motion: one motion is needed, this is a batch of {motion.batch}")
+    inputs = None
+    if joints is not None or start is not None:
+        if callable(of) or of not in ANGLES or isinstance(baseline, Motion) or baseline == MIRRORED:
+            raise WrongObjectError(
+                "joints and start: error bars are those of twist, tilt and somersault against a posture; leave them out"
+            )
+        inputs = inputs_of(motion, joints, None, None, None, start, None)
     body, _ = articulated_parts(motion.deformation)
     tree, wheels = SegmentTree(body), tuple(rotor.joint for rotor in rotors_of(motion.deformation))
     conditions, chosen = _conditions(groups)
@@ -331,7 +364,7 @@ def contributions(
         direct = direct_shares(DirectRates(motion, chart, name, axis, tree.joints), np.ravel(sampled), instant)
     measure = _Measure(name, function, chart, axis, instant / motion.duration)
     unit = "" if function is not None else "turns" if name in ("twist", "somersault") else "deg"
-    return _shares(held, measure, grouped, direct, _Choice(name, unit, baseline, instant, chart, orders, seed))
+    return _shares(held, measure, grouped, direct, _Choice(name, unit, baseline, instant, chart, orders, seed, inputs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,6 +376,7 @@ class _Choice:
     chart: LinkChart | None
     orders: int
     seed: int
+    inputs: Inputs | None
 
 
 def _shares(
@@ -354,18 +388,21 @@ def _shares(
     count = len(names)
     interactions = None
     if count <= MOST_EXACT:
-        results = _results(held, measure, range(1 << count))
+        motions = _motions(held, range(1 << count))
+        results = {subset: measure(motion) for subset, motion in motions.items()}
         function, bars = (np.array([results[mask][part] for mask in range(1 << count)]) for part in (0, 1))
         weights = shapley_weights(count)
         shared, errors = weights @ function, np.abs(weights) @ bars
         interactions = shapley_interactions(function)
     else:
         order, before = sampled_orders(count, choice.orders, choice.seed)
-        results = _results(held, measure, {int(mask) for mask in before.ravel()} | removals)
+        motions = _motions(held, {int(mask) for mask in before.ravel()} | removals)
+        results = {subset: measure(motion) for subset, motion in motions.items()}
         function = np.array([[results[int(mask)][0] for mask in row] for row in before])
         gains = np.take_along_axis(np.diff(function, axis=1), np.argsort(order, axis=1), axis=1)
         shared, errors = gains.mean(axis=0), gains.std(axis=0, ddof=1) / np.sqrt(len(gains))
-    steep = [mask for mask, (_, _, tilt) in sorted(results.items()) if tilt > STEEP]
+        weights = _weights_of_orders(order, before, [*motions])
+    steep = [mask for mask, (_, _, tilt) in results.items() if tilt > STEEP]
     baseline = choice.baseline
     named = "as in the baseline" if isinstance(baseline, Motion) else (
         "as in the mirrored motion" if isinstance(baseline, str) and baseline == MIRRORED else
@@ -393,8 +430,50 @@ def _shares(
         error=max(bar for _, bar, _ in results.values()),
         steep=tuple(" + ".join(n for k, n in enumerate(names) if mask >> k & 1) or "none" for mask in steep),
         direct=direct,
+        bars=None if choice.inputs is None else _bars(held, measure, motions, bits, weights, choice.inputs),
         _pairs=grouped.pairs,
         _held=held,
+    )
+
+
+def _weights_of_orders(order: Integers, before: Integers, subsets: list[int]) -> Array:
+    """Weights of results of ascending subsets in each share by random orders: (k, q)."""
+    weights = np.zeros((order.shape[1], len(subsets)))
+    places = np.searchsorted(subsets, before)
+    np.add.at(weights, (order, places[:, 1:]), 1.0 / len(order))
+    np.add.at(weights, (order, places[:, :-1]), -1.0 / len(order))
+    return weights
+
+
+def _bars(
+    held: HeldMotions,
+    measure: _Measure,
+    motions: dict[int, Motion],
+    bits: Mapping[str, int],
+    weights: Array,
+    inputs: Inputs,
+) -> ShareBars:
+    assert measure.chart is not None
+    covariance = result_covariance(held, motions, measure.chart, measure.of, measure.fraction, inputs)
+    of_results = dict(zip(motions, np.eye(len(motions)), strict=True))
+    whole, members = (
+        of_results[held.whole],
+        np.array([[bit >> k & 1 for k in range(len(weights))] for bit in bits.values()]),
+    )
+
+    def bars(rows: Array | list[Array]) -> Array:
+        return np.sqrt(np.maximum(np.einsum("rq,qp,rp->r", rows, covariance, rows), 0.0))
+
+    without = np.array([of_results[held.whole & ~bit] for bit in bits.values()])
+    ends = bars([whole, of_results[0], whole - of_results[0]])
+    return ShareBars(
+        whole=float(ends[0]),
+        none=float(ends[1]),
+        change=float(ends[2]),
+        without=bars(without),
+        alone=bars([of_results[bit] for bit in bits.values()]),
+        lost=bars(whole - without),
+        shared=bars(members @ weights),
     )
 
 
@@ -443,11 +522,11 @@ class _Measure:
         return float(value), 2.0 * error / max(abs(np.cos(tilt)), 1e-12), tilt
 
 
-def _results(held: HeldMotions, measure: _Measure, subsets: Iterable[int]) -> dict[int, tuple[float, float, float]]:
-    """Value, error and largest tilt of each subset; the motion itself is not computed again."""
+def _motions(held: HeldMotions, subsets: Iterable[int]) -> dict[int, Motion]:
+    """Motions of subsets in ascending order; the motion itself is not computed again."""
     wanted = set(subsets)
-    motions = held.motions(wanted - {held.whole}) | {held.whole: held.motion}
-    return {mask: measure(motions[mask]) for mask in wanted}
+    made = held.motions(wanted - {held.whole}) | {held.whole: held.motion}
+    return {subset: made[subset] for subset in sorted(wanted)}
 
 
 def _conditions(groups: Any) -> tuple[list[str] | None, Any]:

@@ -32,25 +32,35 @@ def error_bars(
     motion: Motion, options: ErrorOptions, recorded: RecordedMotion | None, fitted: RecordedMomentum | None = None
 ) -> Uncertainty | None:
     """Return the requested error bars, or None; smoothing noise and a fitted momentum request them, too."""
+    given = input_errors(motion, options, recorded, fitted)
+    if not given:
+        return None
+    from ...error_bars.covariance import uncertainty
+
+    return uncertainty(motion, **given)
+
+
+def input_errors(
+    motion: Motion, options: ErrorOptions, recorded: RecordedMotion | None, fitted: RecordedMomentum | None = None
+) -> dict[str, Any]:
+    """Return the errors of the inputs as `uncertainty` takes them: those stated, of smoothing and of a fit."""
     relative = (options.mass_error, options.centre_error, options.inertia_error)
     smoothing = None if recorded is None else recorded.smoothing
     joints = options.joint_noise if options.joint_noise is not None or smoothing is None else smoothing.noise
     deviations = (joints, *relative, options.momentum_error, options.attitude_error)
     if fitted is None and not options.rotor_error and all(given is None for given in deviations):
-        return None
-    from ...error_bars.covariance import uncertainty
+        return {}
     from ...error_bars.error_sources import InertiaErrors
 
     masses, centres, inertias = (given or 0.0 for given in relative)
-    return uncertainty(
-        motion,
-        joints=joints,
-        inertias=InertiaErrors(masses=masses, centres=centres, inertias=inertias) if any(relative) else None,
-        momentum=options.momentum_error,
-        attitude=options.attitude_error,
-        start=fitted,
-        rotors=_rotor_errors(motion, options.rotor_error) if options.rotor_error else None,
-    )
+    return {
+        "joints": joints,
+        "inertias": InertiaErrors(masses=masses, centres=centres, inertias=inertias) if any(relative) else None,
+        "momentum": options.momentum_error,
+        "attitude": options.attitude_error,
+        "start": fitted,
+        "rotors": _rotor_errors(motion, options.rotor_error) if options.rotor_error else None,
+    }
 
 
 def _rotor_errors(motion: Motion, words: tuple[str, ...]) -> dict[str, float]:
