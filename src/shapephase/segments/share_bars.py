@@ -12,7 +12,6 @@ from ..display import frozen
 from ..error_bars.covariance import carried_errors
 from ..error_bars.error_sources import Inputs
 from ..error_bars.result_derivatives import described_by, turns_by_shapes, turns_by_start
-from ..errors import WrongObjectError
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import path_samples
 from .direct_shares import ANGLES, LinkChart
@@ -56,8 +55,6 @@ def result_covariance(
     inputs : errors of the joints, and of a momentum and start that all the motions share
     """
     by_knots, by_start = [], []
-    if path_samples(described_by(held.motion).path).arc is not None:
-        raise WrongObjectError("joints: shares of a path that a geodesic closes have no error bars; close it otherwise")
     for subset, motion in motions.items():
         times = np.unique([0.0, (fraction if of == "tilt" else 1.0) * motion.duration])
         signs = np.ones(len(times))
