@@ -20,6 +20,7 @@ from _site.docstrings import (
     formulas_are_text,
     name_aliases,
     own_names,
+    public_parameters,
     returned_type,
     returned_values_are_descriptions,
     types_by_name,
@@ -152,11 +153,14 @@ def _plain_docstring(_app: Sphinx, what: str, name: str, found: Any, _options: A
 
 
 def _plain_signature(*event: Any) -> tuple[str, str] | None:
-    """Types by their names; and none for a protocol, which nobody calls."""
-    found, signature, returned = event[3], *event[-2:]
+    """Types by their names, of classes without private parameters; and none of a protocol, which nobody calls."""
+    what, found, signature, returned = event[1], event[3], *event[-2:]
     if getattr(found, "_is_protocol", False):
         return "", ""
-    return (types_by_name(signature or ""), types_by_name(returned or "")) if signature or returned else None
+    if not (signature or returned):
+        return None
+    shown = types_by_name(signature or "")
+    return public_parameters(shown) if what == "class" and shown else shown, types_by_name(returned or "")
 
 
 def _mark_line_breaks(_app: Sphinx, _page: str, _template: str, context: dict[str, Any], _tree: Any) -> None:

@@ -220,6 +220,11 @@ def test_what_a_docstring_says_of_returned_values_is_not_their_type(steps, retur
     assert made == f"A.\n\nReturns\n-------\n{shown}\n\nEnd."
 
 
+def test_private_parameters_are_not_in_signatures(steps):
+    signature = "(a: dict[str, tuple[int, int]], *, _b: dict[str, int] = ..., c: int = 0, _d: Any = (1, 2))"
+    assert steps("docstrings").public_parameters(signature) == "(a: dict[str, tuple[int, int]], *, c: int = 0)"
+
+
 def test_formulas_in_docstrings_are_text_but_in_code(steps):
     text = "H = M . B of |M|, (...) -> (..., 3).\n\n>>> f(|x|)  # a . b ...\n1 . 2\n\nThen `|Pi| . x` and |Pi|."
     shown = steps("docstrings").formulas_are_text(text)

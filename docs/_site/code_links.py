@@ -11,6 +11,7 @@ _CITATION = re.compile(
     r"\b(theory|numerics)\.md"
     rf"((?:[ ,;:()-]|\n|and\b|to\b|its\b|errata\b|sections?\b|\d+\b|{CODE}\b|[A-U]\b)*)"
 )
+_PAGE = re.compile(r"\bdocs/(\w+/\w+)\.md")
 _SECTIONS_CITED = re.compile(r"(sections?\s+)(\d+(?:(?:,| and)\s+\d+)*)")
 
 
@@ -21,8 +22,8 @@ def with_targets(page: str, text: str) -> str:
 
 
 def with_links(text: str) -> str:
-    """A docstring in which what it cites of the theory is a link."""
-    return _CITATION.sub(_linked, text)
+    """A docstring in which what it cites of the theory, and of the other pages, is a link."""
+    return _CITATION.sub(_linked, _PAGE.sub(r":doc:`/\1`", text))
 
 
 def _linked(found: re.Match[str]) -> str:

@@ -84,6 +84,18 @@ def returned_type(found: Any) -> str:
     return annotation if isinstance(annotation, str) else ""
 
 
+def public_parameters(signature: str) -> str:
+    """A signature without the parameters that begin with an underscore: the library alone gives them."""
+    parts, depth = [""], 0
+    for letter in signature[1:-1]:
+        depth += (letter in "([{") - (letter in ")]}")
+        if letter == "," and not depth:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return f"({','.join(part for part in parts if not part.lstrip().startswith('_')).lstrip()})"
+
+
 def own_names(found: Any) -> set[str]:
     """Parameters of a function, or members of a class and parameters of its constructor."""
     names = {name for name in dir(found) if not name.startswith("_")} if inspect.isclass(found) else set()

@@ -7,8 +7,9 @@ import re
 _TABLE = re.compile(r"<table.*?</table>", re.DOTALL)
 _WORD = re.compile(r'(?<=<span class="pre">)[^<]+')
 _LONG_WORD = re.compile(r'(?<=<span class="pre">)[^<]{30,}')
+_DEFINED = re.compile(r'(?<=name"><span class="pre">)[^<]+')
 _HEADING = re.compile(r"(?<=<h2>)[\w.]+")
-_BETWEEN_PARTS = re.compile(r"(?<=\w)[_./:](?=\w)|(?<=[a-z])(?=[A-Z])")
+_BETWEEN_PARTS = re.compile(r"(?<=\w)[_./:](?=\w|$)|(?<=[a-z])(?=[A-Z])")
 # MathJax makes boxes of formulas, beside which a browser breaks a line whatever the next letter is.
 _FORMULA = re.compile(r'([(\[“]*)(<span class="math notranslate nohighlight">[^<]*</span>)([)\]”’,.;:!?]*)')
 
@@ -16,7 +17,7 @@ _FORMULA = re.compile(r'([(\[“]*)(<span class="math notranslate nohighlight">[
 def with_line_breaks(body: str) -> str:
     """The HTML of a page with these places marked."""
     body = _TABLE.sub(lambda table: _WORD.sub(_with_breaks, table[0]), body)
-    for names in (_LONG_WORD, _HEADING):
+    for names in (_DEFINED, _LONG_WORD, _HEADING):
         body = names.sub(_with_breaks, body)
     return _FORMULA.sub(_kept_together, body)
 
