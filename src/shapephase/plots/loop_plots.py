@@ -333,7 +333,7 @@ def _draw_space(ax: Any, body: Body, flux: LoopFlux, direction: Array | None, na
     values = np.degrees(shown_part(field, direction)) / np.where(areas > 0.0, areas, 1.0)
     largest = float(np.abs(values).max()) or 1.0
     mapped = ScalarMappable(Normalize(-largest, largest), curvature_colours())
-    triangles = [[tip, *side] for side in pairwise(points)]
+    triangles = [np.stack([tip, *side]) for side in pairwise(points)]
     style.add_polygons(ax, triangles, facecolors=mapped.to_rgba(values), alpha=0.8)
     ax.plot(*points.T, color=style.BLACK, linewidth=1.6)
     ax.plot(*points[:1].T, marker="*", color=style.GREEN, markersize=10.0, linestyle="none")

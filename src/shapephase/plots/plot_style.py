@@ -393,13 +393,13 @@ def inset_where_free(ax: Any, extent: tuple[float, float], room: tuple[float, fl
     return None
 
 
-def add_polygons(ax: Any, polygons: Sequence[ArrayLike], **look: Any) -> None:
+def add_polygons(ax: Any, polygons: Sequence[Array], **look: Any) -> None:
     """Fill polygons, a sequence of (N_k, 3), in three-dimensional axes."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     # Between polygons of different lengths Matplotlib leaves memory that was never set, and reads limits from it.
-    corners, longest = [np.asarray(polygon) for polygon in polygons], max(map(len, polygons))
-    equal = [np.pad(polygon, ((0, longest - len(polygon)), (0, 0)), mode="edge") for polygon in corners]
+    longest = max(map(len, polygons))
+    equal = [np.pad(polygon, ((0, longest - len(polygon)), (0, 0)), mode="edge") for polygon in polygons]
     ax.add_collection3d(Poly3DCollection(np.stack(equal), **look))
 
 
