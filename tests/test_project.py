@@ -269,7 +269,8 @@ def test_the_architecture_page_names_what_there_is():
 def test_the_layers_are_those_of_the_import_contract():
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```text\n *(cli\n.*?)```", page, re.DOTALL)
-    said = [set(re.findall(r"\w+", re.sub(r"\(.*\)", "", line))) for line in block.strip().splitlines()]
+    whole = block.replace("\n    ", " ")  # a long layer goes on in the next line
+    said = [set(re.findall(r"\w+", re.sub(r"\(.*\)", "", line))) for line in whole.strip().splitlines()]
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
         "contracts"
     ]
