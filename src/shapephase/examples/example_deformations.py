@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_choice, check_flag, check_object, moments_argument, number_argument
+from ..arguments import check_flag, check_object, moments_argument, number_argument
 from ..arrays import Array
 from ..body.loading import load_body
 from ..body.particles.point_masses import ParticleBody, particle_body
@@ -491,19 +491,6 @@ def linked_pentagon() -> ParticleBody:
     corners = casadi.substitute(casadi.cumsum(edges), casadi.vertcat(free, closing), casadi.vertcat(inside, closed))
     places = casadi.Function("corners", [chart], [corners])
     return particle_body(np.ones_like(even), places, ["a", "b"], name="linked pentagon")
-
-
-def named_example(name: str) -> Example:
-    """One of `EXAMPLES`, with its default parameters. Raises UnknownNameError.
-
-    Examples
-    --------
-    >>> example = sp.examples.named_example("rigid_body")
-    >>> print(f"{example.phase:.6f} rad")
-    16.739018 rad
-    """
-    check_choice(name, "example", EXAMPLES)
-    return EXAMPLES[name]()
 
 
 def _axial(
