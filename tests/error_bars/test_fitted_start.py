@@ -206,6 +206,28 @@ def test_noise_of_the_joints_is_no_drift_of_the_momentum():
     assert np.all(np.abs(errors) < 4.0 * np.array(bars))
 
 
+def test_the_noise_of_smoothed_joints_is_that_of_the_fit():
+    """Without a noise that is given: the same momenta as with it, of a recording that the fit would doubt."""
+    times, rng = np.linspace(0.0, 1.0, 31), np.random.default_rng(3)
+    attitudes = sp.reconstruct(through(arms(times), 1.0), _MOMENTUM, _START, tolerance=1e-9).attitude(times)
+    recorded = {
+        "time": times,
+        "shapes": arms(times) + 0.02 * rng.normal(size=(31, 2)),
+        "joint_names": np.array(_BODY.joint_names),
+        "base_quat_xyzw": so3.quat_from_matrix(attitudes @ so3.exp(2e-4 * rng.normal(size=(31, 3)))),
+    }
+    smoothed = sp.read_recorded_motion(recorded, _BODY, smooth=0.02, flight="all")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TrajectoryWarning)
+        fits = [
+            sp.motion_from_recording(_BODY, smoothed, joints=joints, tolerance=1e-6).fitted
+            for joints in (None, smoothed.smoothing.noise, 0.0)
+        ]
+    np.testing.assert_array_equal(fits[0].momenta, fits[1].momenta)
+    assert fits[0].conserved
+    assert not fits[2].conserved
+
+
 @pytest.mark.full
 def test_a_jump_of_motion_capture_has_bars_as_long_as_its_momentum_scatters(tmp_path: Path):
     """Of 48 draws of noise like that of the file that ships, each component of the momentum within its 95 % bars, which

@@ -191,7 +191,7 @@ def _other_formats() -> Iterator[Case]:
     yield _case("html", "<html><body>404</body></html>", "HTML.*raw", line=1)
     yield _case("xhtml", '<html xmlns="http://www.w3.org/1999/xhtml"><body/></html>', "HTML", line=1)
     yield _case("collada", '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"/>', "mesh", line=1)
-    yield _case("svg", "<svg/>", "<svg>.*a picture", line=1)
+    yield _case("svg", "<svg/>", "neither a URDF nor an MJCF model", line=1)
     yield _case("capital robot", GOOD.replace("robot", "Robot"), "<Robot>.*expected <robot>", line=2)
     yield _case("mujoco part", "<mujocoinclude/>", "part of an MJCF", line=1, suffix=".xml")
     yield _case("robot in a namespace", edit(("<robot", '<robot xmlns="http://a.b/c"')))

@@ -71,7 +71,7 @@ def contributions_command(
     ] = None,
     joint_noise: Annotated[
         str | None,
-        option(
+        rare(
             "Print error bars of twist, tilt and somersault for this noise of the samples, one standard deviation, in "
             "rad or m or with units; default: that of --smooth. For example `--joint-noise 0.3deg`."
         ),

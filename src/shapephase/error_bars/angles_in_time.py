@@ -61,9 +61,9 @@ def somersault_bars(
     --------
     >>> dive = sp.examples.full_dive()
     >>> motion = sp.reconstruct(dive.deformation, dive.momentum)
-    >>> _, _, twist = sp.error_bars.somersault_bars(motion, [0.5, motion.duration], momentum=0.1)
-    >>> print(twist[0] < twist[1] < 0.05)
-    True
+    >>> somersault, _, _ = sp.error_bars.somersault_bars(motion, [0.5, motion.duration], momentum=0.1)
+    >>> print(f"{somersault[0]:.4f} {somersault[1]:.4f} rad")
+    0.0090 0.0538 rad
     """
     inputs = inputs_of(motion, joints, inertias, momentum, attitude, start, rotors)
     at = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)

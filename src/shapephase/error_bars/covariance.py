@@ -357,7 +357,8 @@ def carried_errors(motion: Motion, inputs: Inputs, by_knots: Array, by_start: Ar
     if inputs.samples is not None:
         moved = by_knots + by_start @ moved_fit_by_knots(motion, inputs)
         total += carried_by_knots(path_samples(described_by(motion).path), moved, inputs.samples)
-    for columns, given in ((slice(3, 6), inputs.momentum), (slice(3), inputs.attitude), (slice(6), inputs.start)):
+    of_momentum, of_all = slice(3, UNKNOWNS), slice(UNKNOWNS)
+    for columns, given in ((of_momentum, inputs.momentum), (slice(3), inputs.attitude), (of_all, inputs.start)):
         if given is not None:
             total += carried(by_start[:, columns], given)
     return total

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_flag, check_object, initial_state_arguments
-from ..arrays import finite_array
+from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..body.couplings.coordinate_map import check_smooth
 from ..body.loading import as_body
 from ..deformation.deformation import Deformation, articulated
 from ..deformation.rotors import RotorValue, mapping_of_joints
 from ..display import frozen
-from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
+from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning, WrongObjectError
 from ..reconstruction.reconstruction import Motion, momentum_from_rate, reconstruct
 from ..run_progress import ProgressCallback
 from ..shape_space.files.flight import ALL, turns
 from ..shape_space.files.read import RecordedMotion
+from ..shape_space.path_samples import path_samples
 from ..warning_filters import quiet
 from .recorded_momentum import RecordedMomentum, momentum_from_recording, warn_of_drift
 
@@ -117,8 +120,7 @@ def motion_from_recording(
                 "the attitude at the start is fitted to the recorded base, with the momentum; leave it out "
                 "(--attitude), or give the momentum, too (--momentum)"
             )
-        if joints is None and recorded.smoothing is not None:
-            joints = recorded.smoothing.noise
+        joints = _noise_of_smoothing(body, recorded) if joints is None else joints
         fitted = _fit(deformation, recorded, attitude, joints, tolerance, find_axes=find_axes)
         return RecordedFlight(fitted.motion, "fit", fitted)
     if find_axes:
@@ -133,6 +135,17 @@ def motion_from_recording(
     start = np.zeros(3) if momentum is None else momentum
     moved = reconstruct(deformation, start, attitude, tolerance=tolerance, progress=progress)
     return RecordedFlight(moved, "given" if given else "nothing")
+
+
+def _noise_of_smoothing(body: Body, recorded: RecordedMotion) -> Array | None:
+    """Noise by which the joints were smoothed (n,); None where a motion has no derivatives by their samples."""
+    if recorded.smoothing is None:
+        return None
+    with suppress(WrongObjectError, ShapeError):
+        path_samples(recorded.path)
+        check_smooth(body.chain.follows, "derivatives by a path need", kinks_only=True)
+        return recorded.smoothing.noise
+    return None
 
 
 def _fit(

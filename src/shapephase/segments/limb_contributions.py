@@ -173,14 +173,14 @@ class Contributions:
         error = f"numerical error {self.error / self.scale:.0e}"
         *_, (_, none, whole, _) = rows = self.rows()
         columns = 20 if self.bars is not None else 12
+        last = columns + 6
         lines = [
             f"{self.of}{when} of {self.link}{unit}: {whole} ({error}); with all groups {self.baseline} {none}",
             "",
             f"{'':{wide}}{'held':>{columns}}{'alone':>{columns}}{'shared':>{columns + 6}}",
         ]
         lines += [
-            f"{name:{wide}}{held:>{columns}}{alone:>{columns}}{shared:>{columns + 6}}"
-            for name, held, alone, shared in rows
+            f"{name:{wide}}{held:>{columns}}{alone:>{columns}}{shared:>{last}}" for name, held, alone, shared in rows
         ]
         if self.interactions is not None and len(self.groups) > 1:
             small = self.small_loop
