@@ -10,7 +10,6 @@ import warnings
 import biorbd
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
@@ -52,39 +51,6 @@ def test_an_acrobat_is_what_biorbd_has(tmp_path, exact_acrobat):
     assert body.joint_units == ("rad",) * 5 + ("m",)
     np.testing.assert_array_equal(body.joint_limits[:2], [[-0.5, 0.9], [-1.0, 1.0]])
     np.testing.assert_allclose(body.mass, 57.25, rtol=4 * EPS)
-
-
-@pytest.mark.usefixtures("kept_locale")
-def test_a_floating_motion_is_that_of_biorbd(tmp_path, exact_acrobat):
-    """biorbd integrates its own equations of the free base; reconstruct has the same attitude in time."""
-    body = loaded(tmp_path, exact_acrobat)
-    path = tmp_path / "model.bioMod"
-    path.write_text(exact_acrobat.replace("\tmeshfile pelvis.bvh // not there\n", "").replace("-9.81", "0"))
-    model = biorbd.Model(str(path))
-    size = np.array([0.3, 0.4, 0.5, 0.4, 0.3, 0.1])[:, None]
-    loop = sp.ShapePath.fourier(0.1 * size[:, 0], np.hstack([size, 0.3 * size]), np.hstack([0.5 * size, size]), 1.0)
-    turns = 2.0 * np.pi * np.arange(1, 3)
-
-    def joints(t):
-        shapes, rates = loop.curve(np.array([t]))
-        waves = np.hstack([size, 0.3 * size]) * turns**2 * np.cos(turns * t)
-        waves = waves + np.hstack([0.5 * size, size]) * turns**2 * np.sin(turns * t)
-        return shapes[0], rates[0], -waves.sum(axis=1)
-
-    def equations(t, state):
-        shape, rate, bend = joints(t)
-        q, v = np.concatenate([state[:6], shape]), np.concatenate([state[6:], rate])
-        q, v = biorbd.GeneralizedCoordinates(q), biorbd.GeneralizedVelocity(v)
-        return np.concatenate([state[6:], model.ForwardDynamicsFreeFloatingBase(q, v, bend).to_array()])
-
-    spin = np.array([0.0, 0.0, 0.0, 0.4, -0.3, 0.6])
-    times = np.linspace(0.0, 1.0, 6)
-    run = solve_ivp(equations, (0.0, 1.0), np.concatenate([np.zeros(6), spin]), "DOP853", times, rtol=1e-12, atol=1e-12)
-    shape, rate, _ = joints(0.0)
-    momentum = body.locked_inertia(shape) @ spin[3:] + body.internal_momentum(shape, rate)
-    motion = sp.reconstruct(sp.articulated(body, loop), momentum, tolerance=1e-11)
-    expected = Rotation.from_euler("XYZ", run.y[3:6].T).as_matrix()
-    np.testing.assert_allclose(motion.attitude(times), expected, rtol=0, atol=1e-9)
 
 
 def test_a_quaternion_is_a_ball_joint(tmp_path, exact_acrobat):

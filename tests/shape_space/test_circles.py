@@ -42,26 +42,6 @@ def chain(tmp_path):
     return sp.load_body(file)
 
 
-@pytest.mark.parametrize("joints", [("near", "far"), ("far", "near")])
-def test_in_the_plane_a_circle_turns_by_minus_the_flux_within(chain, joints):
-    """Turns about one axis commute: the theorem of Stokes is exact. Gauss points along rays, even ones around."""
-    centre, radius = np.array([0.3, -0.8]), 0.9
-    loop = sp.ShapePath.circle(chain, *joints, radius, centre=centre, duration=3.0)
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    angles = 2.0 * np.pi * np.arange(64) / 64
-    rays, shares = 0.5 * radius * (nodes + 1.0), 0.5 * radius * weights * 2.0 * np.pi / 64
-    first, second = (chain.joint_index(name) for name in joints)
-    shapes = np.tile(centre, (24, 64, 1))
-    shapes[..., first] += rays[:, None] * np.cos(angles)
-    shapes[..., second] += rays[:, None] * np.sin(angles)
-    field = sp.curvature(chain, shapes)[..., first, second, 2]
-    flux = np.einsum("r,r,ra->", shares, rays, field)
-    turn = sp.so3.log(sp.holonomy(chain, loop, 1e-12))[2]
-    assert turn == pytest.approx(-flux, abs=4e-12)
-    assert abs(turn) > 0.005
-    assert loop.duration == 3.0
-
-
 def test_small_circles_of_the_cat_turn_it_by_the_curvature_times_their_area():
     """The next order in the radius is the third: half the circle, an eighth of the rest."""
     cat = sp.load_body("cat")
