@@ -66,7 +66,7 @@ class Contributions:
     shared : (k,) Shapley values of the groups; they add up to whole - none
     errors : (k,) estimates of the errors of `shared`; of sampled orders standard errors
     interactions : (k, k) Shapley-Taylor: alone on the diagonal, pairs beside it; None for sampled orders
-    small_loop : (k, k) curvature times area, what a small loop without momentum tends to; None for other motions
+    small_loop : (k, k) minus curvature times area, what a small loop without momentum tends to; None for other motions
     error : estimate of the error of `whole`, and of each held motion at most
     steep : groups that move in those motions whose tilt passes 85 degrees, where counts lose their meaning
     direct : what momentum and joints did along the motion; None for results without rates
@@ -580,7 +580,7 @@ def _instant(motion: Motion, chart: LinkChart, at: str | float) -> float:
 
 
 def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
-    """Curvature at the first posture times projected areas, by pairs of groups: (k, k); None for other motions."""
+    """Minus curvature at the first posture times projected areas, by pairs: (k, k); None for other motions."""
     motion, chart = held.motion, choice.chart
     body, path = articulated_parts(motion.deformation)
     closes = float(np.abs(path.gap).max(initial=0.0)) <= CLOSED and not motion.momentum.any()
