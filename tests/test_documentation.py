@@ -352,5 +352,5 @@ def test_there_are_25_questions_each_with_a_command():
 
 
 def test_a_constant_has_the_text_below_its_definition(steps):
-    documented = steps("reference_pages").constant_documentation("shapephase.examples.CLOSED_ORBITS")
-    assert documented[0].startswith("Motions whose shape and momentum close together")
+    documented = steps("reference_pages").constant_documentation("shapephase.examples.MOTIONS")
+    assert documented[0].startswith("Motions that come with the library")

@@ -97,7 +97,7 @@ def inputs_of(
     links = None if inertias is None else _link_variances(body, inertias)
     fit, together = None, None
     if isinstance(start, RecordedMomentum):
-        fit, together = start, start.covariance
+        fit, together = start, start.covariance if joints is None else start.covariance_by_base
         if isinstance(motion, ForcedMotion) or not (
             np.array_equal(fit.momentum, motion.momentum)
             and np.array_equal(fit.initial_attitude, motion.initial_attitude)

@@ -17,7 +17,7 @@ from ..display import frozen
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion
 from ..reconstruction.recorded_base import INVERSE, W_FIRST, read_w_first
-from ..shape_space.path_samples import path_samples
+from ..shape_space.path_samples import PathSamples, path_samples
 from ._along_motion import legendre
 from ._flight_fit import UNKNOWNS, Fitted, FlightFit, check_near, flight_fitted, from_few, size
 from ._joint_noise import carried_by_knots, sample_covariance
@@ -45,8 +45,10 @@ class RecordedMomentum:
     momentum_covariance : (3, 3) [(kg m^2/s)^2], as `uncertainty` takes it
     attitude_covariance : (3, 3) of the turn of the start, base axes [rad^2], as `uncertainty` takes it
     covariance : (6, 6) of both, the turn of the start first, as `uncertainty` takes it: by the noise of the recorded
-        attitudes alone, with its correlation in time, and by a momentum that changes; with the noise of the joints it
-        is `uncertainty(fit.motion, start=fit, joints=...).start`
+        base, and by that of the joints if the fit was given it; else, with this noise, it is
+        `uncertainty(fit.motion, start=fit, joints=...).start`
+    covariance_by_base : (6, 6) the part of it by the noise of the recorded base, with its correlation in time, and by a
+        momentum that changes
     by_attitudes : (6, 3 N) their change by turns of the attitudes, base axes, those of the rates that follow included
     noise : of each component of a recorded attitude, given or as the fit leaves it [rad]
     noise_correlation : of the noise of neighbouring attitudes, as the fit leaves it: 0 for white noise
@@ -72,6 +74,7 @@ class RecordedMomentum:
     momentum_covariance: Array
     attitude_covariance: Array
     covariance: Array
+    covariance_by_base: Array
     by_attitudes: Array
     noise: float
     noise_correlation: float
@@ -404,13 +407,18 @@ def _estimated(
         conserved = not sure or bool(np.linalg.norm(deviations, axis=1).max() <= _CONSTANT * turning)
     covariance = np.pad(covariance, ((fixed, 0), (fixed, 0)))
     by_attitudes, by_rates = _by_recorded(least, motion, np.pad(estimator, ((fixed, 0), (0, 0)))[:UNKNOWNS])
-    extra = covariance[UNKNOWNS:, UNKNOWNS:]
+    extra, by_base = covariance[UNKNOWNS:, UNKNOWNS:], covariance[:UNKNOWNS, :UNKNOWNS]
+    whole = by_base
+    if joint_noise is not None:
+        by_knots = fit_by_knots(motion, times, by_attitudes, by_rates)
+        whole = by_base + carried_by_knots(_samples(motion), by_knots, joint_noise)
     return RecordedMomentum(
         momentum=motion.momentum,
         initial_attitude=motion.initial_attitude,
-        momentum_covariance=covariance[3:UNKNOWNS, 3:UNKNOWNS],
-        attitude_covariance=covariance[:3, :3],
-        covariance=covariance[:UNKNOWNS, :UNKNOWNS],
+        momentum_covariance=whole[3:, 3:],
+        attitude_covariance=whole[:3, :3],
+        covariance=whole,
+        covariance_by_base=by_base,
         by_attitudes=by_attitudes,
         noise=noise or (0.0 if least.recorded is None else seen[0]),
         noise_correlation=lefts[0].correlation,
@@ -449,9 +457,12 @@ def _carried_noise(least: FlightFit, motion: Motion, columns: Array, noise: Arra
     others = 3 * len(least.times) * (least.recorded is not None and least.rates is not None)
     by_attitudes, by_rates = _by_recorded(least, motion, np.pad(columns.T, ((0, 0), (0, others))))
     by_knots = fit_by_knots(motion, least.times, by_attitudes, by_rates)
-    samples = path_samples(deformation_parts(motion.deformation).path)
-    values, axes = np.linalg.eigh(carried_by_knots(samples, by_knots, noise))
+    values, axes = np.linalg.eigh(carried_by_knots(_samples(motion), by_knots, noise))
     return columns @ (axes * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _samples(motion: Motion) -> PathSamples:
+    return path_samples(deformation_parts(motion.deformation).path)
 
 
 def warn_of_drift(fit: RecordedMomentum) -> None:
