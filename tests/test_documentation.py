@@ -239,16 +239,18 @@ def test_signatures_name_types_that_sphinx_spells_out(steps):
     assert shown == "(x: ArrayLike, y: ~a.B = ...) -> tuple[Array, Array]"
 
 
-def test_lines_break_in_long_names_of_tables_and_headings_and_not_before_a_comma(steps):
+def test_lines_break_in_long_names_of_tables_and_headings_and_not_in_options_or_before_a_comma(steps):
     name, formula = '<span class="pre">a_b/c.py</span>', '<span class="math notranslate nohighlight">\\(x_1.5\\)</span>'
     body = (
         f"<h2>a_b.CrownRegion<a></a></h2><p>{name} ({formula}, {formula} {formula}.</p><table><td>{name}</td></table>"
+        '<span class="pre">--joint-noise</span>'
     )
     shown = steps("line_breaks").with_line_breaks(body)
     assert shown == (
         f'<h2>a_<wbr>b.<wbr>Crown<wbr>Region<a></a></h2><p>{name} <span class="unbroken">({formula},</span> {formula} '
         f'<span class="unbroken">{formula}.</span></p>'
         '<table><td><span class="pre">a_<wbr>b/<wbr>c.<wbr>py</span></td></table>'
+        '<span class="pre"><span class="unbroken">--joint-noise</span></span>'
     )
 
 

@@ -1,4 +1,4 @@
-"""Where lines of a page may break: between the parts of a long name, and not between a formula and its comma."""
+"""Where lines of a page may break: between the parts of a long name, and not in an option or before a comma."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ _LONG_WORD = re.compile(r'(?<=<span class="pre">)[^<]{30,}')
 _DEFINED = re.compile(r'(?<=name"><span class="pre">)[^<]+')
 _HEADING = re.compile(r"(?<=<h2>)[\w.]+")
 _BETWEEN_PARTS = re.compile(r"(?<=\w)[_./:](?=\w|$)|(?<=[a-z])(?=[A-Z])")
+# A browser breaks a line after each hyphen, also after the two of an option.
+_OPTION = re.compile(r'(?<=<span class="pre">)-[\w-]+')
 # MathJax makes boxes of formulas, beside which a browser breaks a line whatever the next letter is.
 _FORMULA = re.compile(r'([(\[“]*)(<span class="math notranslate nohighlight">[^<]*</span>)([)\]”’,.;:!?]*)')
 
@@ -19,6 +21,7 @@ def with_line_breaks(body: str) -> str:
     body = _TABLE.sub(lambda table: _WORD.sub(_with_breaks, table[0]), body)
     for names in (_DEFINED, _LONG_WORD, _HEADING):
         body = names.sub(_with_breaks, body)
+    body = _OPTION.sub(lambda option: f'<span class="unbroken">{option[0]}</span>', body)
     return _FORMULA.sub(_kept_together, body)
 
 

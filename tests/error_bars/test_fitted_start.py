@@ -153,9 +153,11 @@ def test_what_does_not_go_together(exact: sp.RecordedMomentum):
 
 @pytest.mark.parametrize("joint_noise", [0.0, np.radians(0.3)])
 @pytest.mark.parametrize("draws", [2, pytest.param(400, marks=pytest.mark.full)])
+@pytest.mark.filterwarnings("ignore:the momentum is not constant")
 def test_bars_of_a_recorded_flight_cover_the_truth(draws: int, joint_noise: float):
     """The attitude at the end, the momentum and theta_M of a second at 60 Hz, inside in 95 % of the recordings: each
-    component and the chi-square, of 400 in 92 to 98 %; and the errors scatter as far as the bars are long."""
+    component and the chi-square, of 400 in 92 to 98 %; and the errors scatter as far as the bars are long, in the
+    middle: in one recording of fifty chance makes a momentum that changes, and longer bars."""
     times = np.linspace(0.0, 1.0, 61)
     truth = sp.reconstruct(through(arms(times), 1.0), _MOMENTUM, _START, tolerance=1e-9)
     attitudes, phase = truth.attitude(times), sp.split(truth).montgomery_phase
@@ -164,7 +166,7 @@ def test_bars_of_a_recorded_flight_cover_the_truth(draws: int, joint_noise: floa
     for row in range(draws):
         recorded = attitudes @ so3.exp(_NOISE * rng.normal(size=(61, 3)))
         noisy = through(arms(times) + joint_noise * rng.normal(size=(61, 2)), 1.0)
-        fit = sp.momentum_from_recording(noisy, times, recorded, noise=_NOISE, tolerance=1e-6)
+        fit = sp.momentum_from_recording(noisy, times, recorded, noise=_NOISE, joints=joint_noise, tolerance=1e-6)
         found = sp.uncertainty(fit.motion, start=fit, joints=joint_noise)
         turn = so3.log(truth.final_attitude @ fit.motion.final_attitude.T)
         off = fit.momentum - _MOMENTUM
@@ -179,7 +181,7 @@ def test_bars_of_a_recorded_flight_cover_the_truth(draws: int, joint_noise: floa
         [np.mean(np.abs(errors) < 1.959964 * bars, axis=0), np.mean(squares < chi2.ppf(0.95, 3), axis=0)]
     )
     assert np.all((inside >= least) & (inside <= most)), inside
-    ratio = np.sqrt(np.mean(errors**2, axis=0)) / bars.mean(axis=0)
+    ratio = np.sqrt(np.mean(errors**2, axis=0)) / np.median(bars, axis=0)
     np.testing.assert_allclose(ratio, 1.0, atol=max(0.15, 3.3 / np.sqrt(2.0 * draws)))
 
 

@@ -211,7 +211,7 @@ class Contributions:
         """
         notes = [f"in no group, moving in all motions: {', '.join(self.rest)}"] if self.rest else []
         if self.bars is not None:
-            notes.append("±: one standard deviation by the noise of the recording, to first order")
+            notes.append("±: one standard deviation, by the noise of the recording")
         if self.steep:
             notes.append(f"tilt beyond 85 deg, counts without meaning, in motions of: {'; '.join(self.steep)}")
         if self.of == "phase" and np.ptp([self.whole, self.none, *self.without, *self.alone]) > np.pi:
