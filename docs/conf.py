@@ -8,6 +8,7 @@ from typing import Any
 
 from sphinx.application import Sphinx
 from sphinx.util import logging
+from sphinx.util.inspect import TypeAliasForwardRef
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
@@ -18,7 +19,6 @@ from _site.coverage import write_tables
 from _site.docstrings import (
     entries_are_descriptions,
     formulas_are_text,
-    name_aliases,
     own_names,
     public_parameters,
     returned_type,
@@ -170,7 +170,8 @@ def _mark_line_breaks(_app: Sphinx, _page: str, _template: str, context: dict[st
 
 def setup(app: Sphinx) -> None:
     """Steps of the build that are this site's own."""
-    name_aliases()
+    # In signatures and types of attributes, an alias of a type goes by its name.
+    TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # type: ignore[method-assign]
     app.add_config_value("library", "", "env", str)
     app.connect("config-inited", _write_pages)
     app.connect("source-read", _add_targets)

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from itertools import cycle
 from typing import Any
 
-from sphinx.util.inspect import TypeAliasForwardRef
-
 _LITERAL = re.compile(r"(``.+?``|`[^`]+`)", re.DOTALL)
 _EXAMPLE = re.compile(r"^ *>>> .*(?:\n(?! *$).*)*", re.MULTILINE)
 _DOT_PRODUCT = re.compile(r"(?<=\S) \. (?=\S)")
@@ -103,8 +101,3 @@ def own_names(found: Any) -> set[str]:
         return names | {*inspect.signature(found).parameters}
     except (TypeError, ValueError):
         return names
-
-
-def name_aliases() -> None:
-    """In signatures and types of attributes, an alias of a type goes by its name."""
-    TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # type: ignore[method-assign]
