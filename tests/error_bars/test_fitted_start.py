@@ -168,6 +168,7 @@ def test_bars_of_a_recorded_flight_cover_the_truth(draws: int, joint_noise: floa
         noisy = through(arms(times) + joint_noise * rng.normal(size=(61, 2)), 1.0)
         fit = sp.momentum_from_recording(noisy, times, recorded, noise=_NOISE, joints=joint_noise, tolerance=1e-6)
         found = sp.uncertainty(fit.motion, start=fit, joints=joint_noise)
+        np.testing.assert_allclose(fit.covariance, found.start, rtol=1e-9, atol=1e-12 * found.start.max())
         turn = so3.log(truth.final_attitude @ fit.motion.final_attitude.T)
         off = fit.momentum - _MOMENTUM
         errors[row] = [*turn, *off, sp.split(fit.motion).montgomery_phase - phase]

@@ -718,6 +718,24 @@ def test_shares_of_random_orders_and_with_wheels_have_bars(monkeypatch):
     np.testing.assert_allclose(sampled.bars.shared, exact.bars.shared, rtol=0.1)
 
 
+@pytest.mark.full
+def test_bars_that_are_shown_hold_what_random_orders_leave_open(monkeypatch):
+    """Beside noise that is next to none: shares of 24 seeds scatter as far."""
+    monkeypatch.setattr("shapephase.segments.limb_contributions.MOST_EXACT", 1)
+    motion = noisy_dive(arm_samples())
+    drawn = [sp.contributions(motion, joints=1e-9, orders=40, seed=seed) for seed in range(24)]
+    scatter = np.std([shares.shared for shares in drawn], axis=0, ddof=1)
+    shown = np.mean([shares.shared_bars[:2] for shares in drawn], axis=0)
+    np.testing.assert_allclose(scatter, shown, rtol=4.0 / np.sqrt(2.0 * len(drawn)))
+    assert any("random orders" in note for note in drawn[0].notes())
+
+
+def test_a_given_posture_has_the_bars_of_the_same_one_by_name():
+    motion = noisy_dive(arm_samples())
+    by_name, given = (sp.contributions(motion, joints=0.01, baseline=at) for at in ("neutral", np.zeros(2)))
+    np.testing.assert_allclose(bars_of(given), bars_of(by_name), rtol=1e-9)
+
+
 def test_the_command_prints_bars_of_a_recording_in_table_json_and_page(tmp_path, capfd):
     file, page = ROBOTS / "diver_dive.mot", tmp_path / "shares.html"
     command = ["contributions", "diver", str(file), "--flight", "auto", "--joint-noise", "0.3deg"]

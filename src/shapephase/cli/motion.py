@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from ..error_bars.recorded_momentum import RecordedMomentum
 
 _STANDARD_INPUT = "-"  # instead of a file name
+_RECONSTRUCTIONS = 10  # in a fit of a momentum: two in each of some five rounds
 DEFAULT_TOLERANCE = 1e-9  # [rad] that of `reconstruct`, for commands without the option
 
 # Endings of files that hold motions, and never bodies.
@@ -126,7 +127,8 @@ def flight(
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
     path, recorded = joint_motion(motion, plain, recording, spinning, given=options.has_momentum)
-    expect_work(rows=len(path.breaks))
+    is_fitted = recorded is not None and not options.has_momentum
+    expect_work(rows=len(path.breaks) * (_RECONSTRUCTIONS if is_fitted else 1))
     if recorded is None:
         deformation = spinning.deformation(loaded, path, None)
         if rate is not None:

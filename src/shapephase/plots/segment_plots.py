@@ -156,7 +156,7 @@ def plot_somersault(ax: Axes, motion: Motion, *, times: Array | None = None, **e
 def plot_shares(ax: Axes, shares: Contributions) -> Axes:
     """Draw for each group what it adds on average (Shapley), and what is lost with it on the baseline.
 
-    Error bars are those of a recording's noise, one standard deviation, else the numerical errors.
+    Error bars are those of a recording's noise and of random orders, one standard deviation, else numerical errors.
 
     Parameters
     ----------
@@ -175,11 +175,9 @@ def plot_shares(ax: Axes, shares: Contributions) -> Axes:
     check_flat_axes(ax)
     names, places = list(shares.groups), np.arange(len(shares.groups))
     lost, bars = shares.whole - shares.without[: len(names)], shares.bars
-    of_shared, of_lost = shares.errors, np.full(len(names), shares.error)
-    if bars is not None:
-        of_shared, of_lost = bars.shared[: len(names)], bars.lost[: len(names)]
+    of_lost = np.full(len(names), shares.error) if bars is None else bars.lost[: len(names)]
     for values, errors, offset, colour, text in (
-        (shares.shared, of_shared, -0.5, BLUE, "shared: average over all orders"),
+        (shares.shared, shares.shared_bars[: len(names)], -0.5, BLUE, "shared: average over all orders"),
         (lost, of_lost, 0.5, ORANGE, "lost when held"),
     ):
         ax.barh(places + offset * _BAR, values / shares.scale, _BAR, color=colour, label=text,

@@ -102,6 +102,15 @@ def sampled_orders(count: int, orders: int, seed: int) -> tuple[Integers, Intege
     return order, np.concatenate([np.zeros((orders, 1), dtype=np.int64), np.cumsum(1 << order, axis=1)], axis=1)
 
 
+def weights_of_orders(order: Integers, before: Integers, subsets: list[int]) -> Array:
+    """Weights of ascending subsets in each member's share by `sampled_orders`: (k, q)."""
+    weights = np.zeros((order.shape[1], len(subsets)))
+    places = np.searchsorted(subsets, before)
+    np.add.at(weights, (order, places[:, 1:]), 1.0 / len(order))
+    np.add.at(weights, (order, places[:, :-1]), -1.0 / len(order))
+    return weights
+
+
 def _sizes(masks: Integers) -> Integers:
     return np.array([int(mask).bit_count() for mask in masks])
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_keywords, check_object, number_argument, times_argument, vector_argument, whole_argument
-from ..arrays import Array, Integers, read_only
+from ..arrays import Array, read_only
 from ..body.body import Body
 from ..display import frozen, number_with_bar
 from ..error_bars.error_sources import Inputs, inputs_of
@@ -25,7 +25,7 @@ from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.connection import curvature
 from ..shape_space.shape_path import CLOSED
-from .coalitions import sampled_orders, shapley_interactions, shapley_weights
+from .coalitions import sampled_orders, shapley_interactions, shapley_weights, weights_of_orders
 from .direct_shares import (
     ANGLES,
     STEEP,
@@ -39,7 +39,7 @@ from .direct_shares import (
 from .held_motions import MIRRORED, HeldMotions
 from .limbs import CONDITIONS, WHEELS, JointGroups, SegmentTree, joint_groups
 from .mirrored_motion import mirrored_motion
-from .share_bars import ShareBars, result_covariance
+from .share_bars import ShareBars, result_covariance, share_bars
 
 MOST_EXACT = 10  # groups of which all subsets are computed: 1,024 motions
 _ROWS = 201  # times of the direct shares, as many as of other tables
@@ -136,25 +136,39 @@ class Contributions:
             return number_with_bar(value / self.scale, bar / self.scale)
         return f"{round(value / self.scale, 3) + 0.0:.3f}"
 
+    @property
+    def shared_bars(self) -> Array:
+        """Bars of the Shapley values of `held_names`, by noise and random orders together: (h,) [rad].
+
+        Without both they are estimates of numerical errors. Those of a mirrored pair are upper bounds.
+        """
+        errors = self._of_held(self.errors)
+        return errors if self.bars is None else np.hypot(self.bars.shared, errors)
+
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Return the rows of the table: name, result without the group, result with it alone, shared.
 
-        With bars of the noise where they are known, else shares of sampled orders with their standard errors.
+        With bars of the noise where it is known, and of shares by random orders.
         """
-        shares, text = dict(zip(self.groups, self.shared, strict=True)), self.text
-        shared = [sum(shares[member] for member in self._pairs.get(name, (name,))) for name in self.held_names]
-        values = np.array([self.without, self.alone, shared])
-        bars, ends = np.zeros_like(values), (0.0, 0.0, 0.0)
-        bars[2, : len(shares)] = self.errors
-        if self.bars is not None:
-            bars, ends = np.array([self.bars.without, self.bars.alone, self.bars.shared]), self.bars.ends
-        names, values = [*self.held_names, "all groups"], [*values.T, (self.none, self.whole, self.shared.sum())]
-        return [
-            (name, text(held, of_held), text(alone, of_alone), text(share, of_share))
-            for name, (held, alone, share), (of_held, of_alone, of_share) in zip(
-                names, values, [*bars.T, ends], strict=True
+        text, bars, exact = self.text, self.bars, np.zeros(len(self.held_names))
+        of_held, of_alone, ends = exact, exact, (0.0, 0.0, 0.0)
+        if bars is not None:
+            of_held, of_alone, ends = bars.without, bars.alone, bars.ends
+        held, alone, shared = (
+            [text(value, bar) for value, bar in zip(values, widths, strict=True)]
+            for values, widths in (
+                (self.without, of_held),
+                (self.alone, of_alone),
+                (self._of_held(self.shared), self.shared_bars),
             )
-        ]
+        )
+        totals = (text(self.none, ends[0]), text(self.whole, ends[1]), text(self.shared.sum(), ends[2]))
+        return [*zip(self.held_names, held, alone, shared, strict=True), ("all groups", *totals)]
+
+    def _of_held(self, values: Array) -> Array:
+        """Sums over the members of each of `held_names`: (k,) -> (h,)."""
+        own = dict(zip(self.groups, values, strict=True))
+        return np.array([sum(own[member] for member in self._pairs.get(name, (name,))) for name in self.held_names])
 
     def direct_rows(self) -> list[tuple[str, str]]:
         """Return sources of the direct shares that did something, the largest first, with their totals."""
@@ -177,7 +191,7 @@ class Contributions:
         lines = [
             f"{self.of}{when} of {self.link}{unit}: {whole} ({error}); with all groups {self.baseline} {none}",
             "",
-            f"{'':{wide}}{'held':>{columns}}{'alone':>{columns}}{'shared':>{columns + 6}}",
+            f"{'':{wide}}{'held':>{columns}}{'alone':>{columns}}{'shared':>{last}}",
         ]
         lines += [
             f"{name:{wide}}{held:>{columns}}{alone:>{columns}}{shared:>{last}}" for name, held, alone, shared in rows
@@ -211,7 +225,8 @@ class Contributions:
         """
         notes = [f"in no group, moving in all motions: {', '.join(self.rest)}"] if self.rest else []
         if self.bars is not None:
-            notes.append("±: one standard deviation, by the noise of the recording")
+            orders = " and random orders" if self.interactions is None else ""
+            notes.append(f"±: one standard deviation, by the noise of the recording{orders}")
         if self.steep:
             notes.append(f"tilt beyond 85 deg, counts without meaning, in motions of: {'; '.join(self.steep)}")
         if self.of == "phase" and np.ptp([self.whole, self.none, *self.without, *self.alone]) > np.pi:
@@ -318,9 +333,9 @@ def contributions(
     check_keywords(axes, contributions, ("lateral", "longitudinal", "somersault", "up"))
     if motion.batch:
         raise ShapeError(f"motion: one motion is needed, this is a batch of {motion.batch}")
-    inputs = None
+    is_mirrored, inputs = isinstance(baseline, str) and baseline == MIRRORED, None
     if joints is not None or start is not None:
-        if callable(of) or of not in ANGLES or isinstance(baseline, Motion) or baseline == MIRRORED:
+        if callable(of) or of not in ANGLES or isinstance(baseline, Motion) or is_mirrored:
             raise WrongObjectError(
                 "joints and start: error bars are those of twist, tilt and somersault against a posture; leave them out"
             )
@@ -331,7 +346,6 @@ def contributions(
     if conditions is not None and WHEELS in conditions and not wheels:
         raise ShapeError(f"groups: the motion has no wheels; leave {WHEELS} out, or give their momentum (rotors=)")
     grouped = _without_wheels(joint_groups(body, chosen), body, wheels)
-    is_mirrored = isinstance(baseline, str) and baseline == MIRRORED
     compared = mirrored_motion(motion, **axes) if is_mirrored else baseline
     held = HeldMotions(motion, grouped.columns, compared, conditions, grouped.rest)
     if WHEELS in held.conditions:
@@ -390,9 +404,9 @@ def _shares(
     if count <= MOST_EXACT:
         motions = _motions(held, range(1 << count))
         results = {subset: measure(motion) for subset, motion in motions.items()}
-        function, bars = (np.array([results[mask][part] for mask in range(1 << count)]) for part in (0, 1))
+        function, error = (np.array([results[mask][part] for mask in range(1 << count)]) for part in (0, 1))
         weights = shapley_weights(count)
-        shared, errors = weights @ function, np.abs(weights) @ bars
+        shared, errors = weights @ function, np.abs(weights) @ error
         interactions = shapley_interactions(function)
     else:
         order, before = sampled_orders(count, choice.orders, choice.seed)
@@ -401,7 +415,12 @@ def _shares(
         function = np.array([[results[int(mask)][0] for mask in row] for row in before])
         gains = np.take_along_axis(np.diff(function, axis=1), np.argsort(order, axis=1), axis=1)
         shared, errors = gains.mean(axis=0), gains.std(axis=0, ddof=1) / np.sqrt(len(gains))
-        weights = _weights_of_orders(order, before, [*motions])
+        weights = weights_of_orders(order, before, [*motions])
+    bars = None
+    if choice.inputs is not None:
+        assert measure.chart is not None
+        covariance = result_covariance(held, motions, measure.chart, measure.of, measure.fraction, choice.inputs)
+        bars = share_bars(covariance, [*motions], [*bits.values()], weights)
     steep = [mask for mask, (_, _, tilt) in results.items() if tilt > STEEP]
     baseline = choice.baseline
     named = "as in the baseline" if isinstance(baseline, Motion) else (
@@ -430,50 +449,9 @@ def _shares(
         error=max(bar for _, bar, _ in results.values()),
         steep=tuple(" + ".join(n for k, n in enumerate(names) if mask >> k & 1) or "none" for mask in steep),
         direct=direct,
-        bars=None if choice.inputs is None else _bars(held, measure, motions, bits, weights, choice.inputs),
+        bars=bars,
         _pairs=grouped.pairs,
         _held=held,
-    )
-
-
-def _weights_of_orders(order: Integers, before: Integers, subsets: list[int]) -> Array:
-    """Weights of results of ascending subsets in each share by random orders: (k, q)."""
-    weights = np.zeros((order.shape[1], len(subsets)))
-    places = np.searchsorted(subsets, before)
-    np.add.at(weights, (order, places[:, 1:]), 1.0 / len(order))
-    np.add.at(weights, (order, places[:, :-1]), -1.0 / len(order))
-    return weights
-
-
-def _bars(
-    held: HeldMotions,
-    measure: _Measure,
-    motions: dict[int, Motion],
-    bits: Mapping[str, int],
-    weights: Array,
-    inputs: Inputs,
-) -> ShareBars:
-    assert measure.chart is not None
-    covariance = result_covariance(held, motions, measure.chart, measure.of, measure.fraction, inputs)
-    of_results = dict(zip(motions, np.eye(len(motions)), strict=True))
-    whole, members = (
-        of_results[held.whole],
-        np.array([[bit >> k & 1 for k in range(len(weights))] for bit in bits.values()]),
-    )
-
-    def bars(rows: Array | list[Array]) -> Array:
-        return np.sqrt(np.maximum(np.einsum("rq,qp,rp->r", rows, covariance, rows), 0.0))
-
-    without = np.array([of_results[held.whole & ~bit] for bit in bits.values()])
-    ends = bars([whole, of_results[0], whole - of_results[0]])
-    return ShareBars(
-        whole=float(ends[0]),
-        none=float(ends[1]),
-        change=float(ends[2]),
-        without=bars(without),
-        alone=bars([of_results[bit] for bit in bits.values()]),
-        lost=bars(whole - without),
-        shared=bars(members @ weights),
     )
 
 
@@ -584,8 +562,7 @@ def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
     motion, chart = held.motion, choice.chart
     body, path = articulated_parts(motion.deformation)
     closes = float(np.abs(path.gap).max(initial=0.0)) <= CLOSED and not motion.momentum.any()
-    at_first = isinstance(choice.baseline, str) and choice.baseline == "first"
-    if held.conditions or not closes or not at_first or chart is None or body.ball_joints:
+    if held.conditions or not closes or not held.at_first_posture or chart is None or body.ball_joints:
         return None
     if choice.of not in ("twist", "somersault"):
         return None

@@ -69,6 +69,32 @@ def result_covariance(
     return carried_errors(held.motion, inputs, np.array(by_knots), np.array(by_start))
 
 
+def share_bars(covariance: Array, subsets: list[int], removals: list[int], weights: Array) -> ShareBars:
+    """Bars from the covariance of the results of ascending subsets.
+
+    covariance : (q, q) of `result_covariance`, of subsets from the empty one to that of all k groups
+    removals : subset of each group and of each mirrored pair
+    weights : (k, q) of the results in the shares of the groups
+    """
+    of_results, members = dict(zip(subsets, np.eye(len(subsets)), strict=True)), np.arange(len(weights))
+    none, whole = of_results[subsets[0]], of_results[subsets[-1]]
+    without = np.array([of_results[subsets[-1] & ~removed] for removed in removals])
+
+    def bars(rows: Array | list[Array]) -> Array:
+        return np.sqrt(np.maximum(np.einsum("rq,qp,rp->r", rows, covariance, rows), 0.0))
+
+    ends = bars([whole, none, whole - none])
+    return ShareBars(
+        whole=float(ends[0]),
+        none=float(ends[1]),
+        change=float(ends[2]),
+        without=bars(without),
+        alone=bars([of_results[removed] for removed in removals]),
+        lost=bars(whole - without),
+        shared=bars((np.array(removals)[:, None] >> members & 1) @ weights),
+    )
+
+
 def _by_knots(held: HeldMotions, subset: int, motion: Motion, times: Array, by_turns: Array, frame: int) -> Array:
     """Derivative by the recorded path at its knots, of a number that depends on attitudes of a link: (knots n,).
 
