@@ -81,13 +81,16 @@ def test_without_what_is_not_known_there_are_no_bars(capfd, take):
     assert "uncertainty" not in json.loads(said(capfd, "split", "diver", take, "--json"))
 
 
-def test_an_angle_without_a_bar_is_told_as_such():
+def test_an_angle_of_zero_has_the_bar_of_the_whole_rotation():
     body = sp.load_body("diver")
     path = sp.ShapePath.spline(np.linspace(0.0, 1.0, 9), np.zeros((9, 2)), periodic=False)
     motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3))
     found = sp.split(motion)
-    lines = error_bar_lines(found, sp.uncertainty(motion, joints=0.01))
-    assert sum("no bar of an angle" in line for line in lines) == 2
+    bars = sp.uncertainty(motion, joints=0.01)
+    lines = error_bar_lines(found, bars)
+    (total,) = (line for line in lines if line.startswith("total rotation"))
+    assert float(total.split()[2]) == 0.0
+    assert float(total.split()[4]) == pytest.approx(np.degrees(np.sqrt(np.trace(bars.total_rotation))), rel=0.1)
     assert not any("phase" in line for line in lines)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 
-_BARS_FROM_THE_ENDS = 5.0  # from an angle to 0 and to 180 degrees, for it to have a bar of its own
+_BARS_FROM_ZERO = 5.0  # an angle that is as large changes by turns about its own axis alone
 
 
 def carried(derivative: Array, covariance: Array) -> Array:
@@ -16,12 +16,13 @@ def carried(derivative: Array, covariance: Array) -> Array:
 
 
 def angle_bar(rotation: Array, covariance: Array) -> float:
-    """The standard deviation of a rotation's angle, along its axis [rad]; NaN near 0 and 180 degrees."""
-    vector = so3.log(rotation)
-    angle = float(np.linalg.norm(vector))
-    # Across the axis the angle of a small rotation only grows: the widest direction decides.
-    widest = float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))
-    if _BARS_FROM_THE_ENDS * widest >= min(angle, np.pi - angle):
-        return np.nan
-    axis = vector / angle
-    return float(np.sqrt(max(axis @ covariance @ axis, 0.0)))
+    """The rms change of a rotation's angle [rad]; near 0 that of the whole rotation, which it cannot exceed.
+
+    Angles at 180 degrees only shrink: theta = pi - |a . e|, by as much as the error e turns about the axis a.
+    """
+    vector, variance = so3.log(rotation), np.trace(covariance)
+    angle = np.linalg.norm(vector)
+    if angle > _BARS_FROM_ZERO * np.sqrt(np.linalg.eigvalsh(covariance)[-1].clip(0.0)):
+        axis = vector / angle
+        variance = axis @ covariance @ axis
+    return float(np.sqrt(max(variance, 0.0)))

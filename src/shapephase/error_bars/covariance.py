@@ -67,8 +67,8 @@ class Uncertainty:
         that moves a fit to a recording
     somersaults, twists : standard deviations of an athlete's counts by `turn_counts`, about the same axes
         [revolutions]; None of another body, and where the tilt at an end is a right angle
-    total_angle, holonomy_angle, wheel_angle : standard deviations of the angles of these rotations [rad]; NaN where an
-        angle is less than five of them from 0 or from 180 degrees: one number cannot state it there
+    total_angle, holonomy_angle, wheel_angle : standard deviations of the angles of these rotations [rad]; at 180
+        degrees rms changes, as an angle only shrinks there; near 0 the rms of the whole rotation, an upper bound
     smoothing_bias : by how much smoothing has shifted the result that it shifts most, as far as that is known, in
         standard deviations of its own, which hold it; 0 where nothing was smoothed or `joints` are exact
     draws : number of motions this was estimated from; 0: by derivatives

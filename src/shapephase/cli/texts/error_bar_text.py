@@ -98,7 +98,7 @@ def error_bar_lines(
     options: ErrorOptions = ERROR_DEFAULTS,
     turns: TurnCounts | None = None,
 ) -> list[str]:
-    """Return lines with angles and their bars in degrees, or where an angle has none the largest error of the rotation.
+    """Return lines with angles and their bars in degrees.
 
     Counts of an athlete follow in revolutions. For a recording without a stated noise, the line says which errors the
     bars or the table contain.
@@ -111,13 +111,13 @@ def error_bar_lines(
             f"{'± above':24}numerical error only; give --joint-noise (0.3deg) for measurement error",
         ]
     lines = ["", "error bars: one standard deviation due to the inputs, to first order"]
-    lines.append(_rotation_line("total rotation", result.total_rotation, found.total_angle, found.total_rotation))
-    name = "  shape holonomy" if result.is_loop else "  shape lift (open)"
-    lines.append(_rotation_line(name, result.holonomy, found.holonomy_angle, found.holonomy))
+    rotations = [
+        ("total rotation", result.total_rotation, found.total_angle),
+        ("  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy, found.holonomy_angle),
+    ]
     if result.has_wheels:
-        lines.append(
-            _rotation_line("  stored wheel momentum", result.wheel_rotation, found.wheel_angle, found.wheel_rotation)
-        )
+        rotations.append(("  stored wheel momentum", result.wheel_rotation, found.wheel_angle))
+    lines += [f"{name:24}{_degrees_with_bar(float(so3.angle(rotation)), bar)}" for name, rotation, bar in rotations]
     if result.has_phase and result.gauge == "horizontal":
         for name, phase, bar in (
             ("Montgomery phase", result.montgomery_phase, found.montgomery_phase),
@@ -142,13 +142,6 @@ def error_bar_lines(
 def error_bar_data(found: Uncertainty | None) -> dict[str, Any]:
     """Return covariances [rad^2] and standard deviations [rad], under `uncertainty`."""
     return {} if found is None else {"uncertainty": plain(found)}
-
-
-def _rotation_line(name: str, rotation: Array, bar: float, covariance: Array) -> str:
-    if math.isfinite(bar):
-        return f"{name:24}{_degrees_with_bar(float(so3.angle(rotation)), bar)}"
-    widest = math.degrees(math.sqrt(max(float(np.linalg.eigvalsh(covariance)[-1]), 0.0)))
-    return f"{name:24}no bar of an angle this near 0 or 180 degrees; error {widest:.2g} deg about the worst axis"
 
 
 def _degrees_with_bar(angle: float, bar: float) -> str:
