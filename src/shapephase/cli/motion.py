@@ -20,6 +20,7 @@ from ..deformation.frames import gauge_link
 from ..deformation.rotors import RotorDescription
 from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
+from ..integrator.constants import USUAL_TOLERANCE
 from ..integrator.machine_code import expect_work
 from ..reconstruction.reconstruction import Motion, momentum_from_rate, reconstruct
 from ..run_progress import ProgressCallback
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
 
 _STANDARD_INPUT = "-"  # instead of a file name
 _RECONSTRUCTIONS = 10  # in a fit of a momentum: two in each of some five rounds
-DEFAULT_TOLERANCE = 1e-9  # [rad] that of `reconstruct`, for commands without the option
 
 # Endings of files that hold motions, and never bodies.
 _OF_MOTIONS = (".csv", ".tsv", ".mot", ".sto", ".npz", ".npy", ".mat", ".parquet", ".xlsx", ".c3d", ".bag", ".mcap")
@@ -104,7 +104,7 @@ def flight(
     motion: str,
     options: StartOptions,
     recording: RecordingOptions,
-    tolerance: float = DEFAULT_TOLERANCE,
+    tolerance: float = USUAL_TOLERANCE,
     progress: ProgressCallback | None = None,
     *,
     gauge: str = "base",

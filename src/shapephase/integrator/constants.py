@@ -19,8 +19,9 @@ ORDER = 8  # of the formula: half as long steps have 2^-8 of the error
 # the order alone would make it 1. With 4 one motion of harmonics in 70 exceeds it, with 8 one of all kinds in 700, by
 # a sixth.
 STEPPING = 10.0
-ANGLE_OF_STEP = 2.5  # [rad] turned in one of the coarsest steps, at a tolerance of 1e-9
-TERMS_OF_STEP = 10.0  # of a panel's series, for one of the coarsest steps at a tolerance of 1e-9
+USUAL_TOLERANCE = 1e-9  # [rad] that of `reconstruct`
+ANGLE_OF_STEP = 2.5  # [rad] turned in one of the coarsest steps, at the usual tolerance
+TERMS_OF_STEP = 10.0  # of a panel's series, for one of the coarsest steps at the usual tolerance
 SMALL_TERM = 0.05  # of the tolerance: steps ignore terms that turn the body by less
 STEPPING_SHARE = 0.4  # of the tolerance, for the error of steps
 

@@ -28,6 +28,7 @@ from .constants import (
     STEPPING,
     STEPPING_SHARE,
     TERMS_OF_STEP,
+    USUAL_TOLERANCE,
 )
 from .interpolant import Interpolant
 from .kernels import spectra_kernel
@@ -40,7 +41,6 @@ from .stepping import Attempt, attempted, largest_angle, magnitudes_and_directio
 _MOST_STEPS = 4_000_000  # of one motion: some ten seconds, and a gigabyte of results
 _MOST_ROUNDS = 10  # of samples and steps
 _GAINS = 0.9  # ratio to the best estimate so far above which a round has failed; two failures end the run
-_USUAL = 1e-9  # [rad] tolerance that ANGLE_OF_STEP and TERMS_OF_STEP are for
 _QUARTERS = 4  # refinements in each factor of two: few, so that momenta of a batch share them
 _LEAST_TOLERANCE = 1e-9  # of the tolerance: samples are not made denser
 _EXAGGERATED = 1024.0  # roundings by which samples are changed, so that the effect stands out of the marches' own
@@ -172,7 +172,7 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
     turn, terms = np.empty((2, len(interpolant.widths)))
     least = SMALL_TERM * tolerance
     spectra_kernel.plan(plain(interpolant.coefficients), interpolant.widths, ceiling, least, turn, terms)
-    finer = (_USUAL / tolerance) ** (1.0 / ORDER)
+    finer = (USUAL_TOLERANCE / tolerance) ** (1.0 / ORDER)
     # However loose the tolerance, only steps that follow the terms show their error.
     steps = np.maximum(max(finer, 1.0) * terms / TERMS_OF_STEP, finer * turn / ANGLE_OF_STEP)
     steps = factor * np.maximum(steps, 1.0)

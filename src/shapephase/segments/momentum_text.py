@@ -22,10 +22,9 @@ def momentum_lines(found: SegmentMomentum) -> list[str]:
     if not found.flights:
         lines.append("no flight found: the centre of mass falls freely nowhere, or places are not recorded")
     for number, flight in enumerate(found.flights, start=1):
-        mean = mean_text(flight)
         lines += [
             "",
-            f"flight {number}, {flight.first_time:.6g} to {flight.last_time:.6g} s: mean ({mean})",
+            f"flight {number}, {flight.first_time:.6g} to {flight.last_time:.6g} s: mean ({mean_text(flight)})",
             f"  {conservation_text(flight)}",
         ]
     rows = link_rows(found)
