@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 HEIGHT = 3.4  # [in] of the stacked figure: its legend has up to five lines
 _COLOURS = (BLUE, ORANGE, SKY, VERMILION, GREEN, PURPLE, GREY)
 _FILLS = ("", "////", "....")  # of areas beyond the seventh, whose colours come again
+_NAMED = len(_COLOURS) - 1  # sources of a turn with an area of their own; the others are grey
 _WIDE = 26  # letters of a name in a legend of two columns
-_SOURCES = (BLUE, ORANGE, GREEN, SKY, VERMILION, PURPLE)
 _BAR = 0.4  # height of a bar: two for each group, and a gap
 _LINE = 0.32  # [in] height of a group in the figure: two bars and two lines of small letters
 _HEAD = 1.1  # [in] of legend and axis
@@ -223,9 +223,10 @@ def plot_direct_shares(ax: Axes, shares: Contributions) -> Axes:
     values = direct.shares / shares.scale
     order = np.argsort(-np.abs(values).max(axis=0), kind="stable")
     order = order[np.abs(values[:, order]).max(axis=0) > 0.0]
-    named, others = order[: len(_SOURCES)], order[len(_SOURCES) :]
+    # In the order of the body, so that a limb has one colour here and in the figure of the momentum.
+    named, others = np.sort(order[:_NAMED]), order[_NAMED:]
     bands: list[tuple[Any, str, str]] = [
-        (values[:, k], colour, direct.sources[k]) for k, colour in zip(named, _SOURCES, strict=False)
+        (values[:, k], colour, direct.sources[k]) for k, colour in zip(named, _COLOURS, strict=False)
     ]
     if len(others):
         bands.append((values[:, others].sum(axis=1), GREY, f"{len(others)} others"))
