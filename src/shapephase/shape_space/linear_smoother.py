@@ -20,6 +20,7 @@ _HALF_POWER = np.sqrt(2.0) - 1.0  # in place of 1 at the cut-off: both passes gi
 _NARROWEST = 10.0**-0.5  # least width tried, in steps of time: next to no smoothing
 _WIDEST = 10.0**2.5  # largest width tried, in steps of time: beyond 300 samples rounding enters the bias
 _WIDTHS_A_DECADE = 6  # tried; a parabola through the best and its neighbours has the optimum
+_AT_ONCE = 16  # right sides: SuperLU goes through all of them at each row, and many leave the processor's cache
 _ROUNDED = 24  # widths per decade that are used: joints of equal width are smoothed together
 
 
@@ -258,9 +259,10 @@ class _Roughness:
     def _with(self, factor: Any, right: Array) -> Array:
         both = np.zeros((len(self._places), right.shape[1]))
         both[: len(right)] = right
-        solution = np.empty_like(both)
-        solution[self._places] = factor.solve(both[self._places])
-        return solution[: len(right)]
+        for first in range(0, right.shape[1], _AT_ONCE):
+            columns = both[:, first : first + _AT_ONCE]
+            columns[self._places] = factor.solve(columns[self._places])
+        return both[: len(right)]
 
     @cached_property
     def _places(self) -> Any:

@@ -112,8 +112,9 @@ def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = 
 def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: ArrayLike | None = None) -> Array:
     """Standard deviations of sums over times (N,) of (N, m, n, 3) derivatives by shape, rate and acceleration: (m,)."""
     check_object(path, "ShapePath", "path")
-    samples, levels = path_samples(path), _levels(path, joints)
-    by_knots = np.einsum("tmja,atk->mkj", derivative, samples.rows_by_knots(times)).reshape(derivative.shape[1], -1)
+    samples, levels, used = path_samples(path), _levels(path, joints), derivative.any(axis=(1, 2, 3))
+    rows = samples.rows_by_knots(times[used])
+    by_knots = np.einsum("tmja,atk->mkj", derivative[used], rows, optimize=True).reshape(derivative.shape[1], -1)
     variance = (by_knots @ samples.bias) ** 2
     for rule in samples.rules:
         answers = rule(by_knots).reshape(len(by_knots), -1, path.n_shape) * levels

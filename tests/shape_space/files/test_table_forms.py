@@ -120,15 +120,15 @@ def nexus(mark):
     return "\n".join(head) + "\n" + lines(None, columns, mark)
 
 
-def opensim(mark=" ", tail=""):
-    head = ["Coordinates", "version=1", f"nRows={COUNT}", "nColumns=3", "inDegrees=yes", "endheader"]
+def opensim(mark=" ", tail="", title="Coordinates"):
+    head = [title, "version=1", f"nRows={COUNT}", "nColumns=3", "inDegrees=yes", "endheader"]
     return "\n".join(line + tail for line in head) + "\n" + table(NAMES, T, *DEG.T, mark=mark)
 
 
-def states():
-    names = ["time", "/jointset/a/arm/value", "/jointset/a/arm/speed", "/jointset/a/leg/value"]
+def states(*names):
     head = ["states", "version=3", "OpenSimVersion=4.5", "inDegrees=no", "DataType=double", "endheader"]
-    return "\n".join(head) + "\n" + table(names, T, ARM, np.gradient(ARM, T), LEG, mark="\t")
+    active = np.full(COUNT, 0.05)
+    return "\n".join(head) + "\n" + table(["time", *names], T, ARM, np.gradient(ARM, T), LEG, active, mark="\t")
 
 
 def rostopic():
@@ -303,7 +303,17 @@ TABLES = {
     ),
     "OpenSim": ("m.mot", text(opensim()), {}, EXACT),
     "OpenSim, saved by a spreadsheet": ("m.csv", text(opensim(",", ",,")), {}, EXACT),
-    "OpenSim of states": ("m.sto", text(states()), {}, EXACT),
+    "OpenSim of states": (
+        "m.sto",
+        text(
+            states(
+                "/jointset/a/arm/value", "/jointset/a/arm/speed", "/jointset/a/leg/value", "/forceset/soleus/activation"
+            )
+        ),
+        {},
+        EXACT,
+    ),
+    "OpenSim 3 of states": ("m.sto", text(states("arm", "arm_u", "leg", "soleus.activation")), {}, EXACT),
     "PlotJuggler": (
         "m.csv",
         text(table(["__time", "/joint_states/arm/position", "/joint_states/leg/position"], UNIX_S, *JOINTS.T)),
@@ -615,6 +625,14 @@ def test_what_cannot_be_known_is_asked(names, words, body, tmp_path):
     (tmp_path / "m.csv").write_text(table(names, *columns))
     with pytest.raises(ShapePhaseError, match=words):
         read_recorded_motion(tmp_path / "m.csv", body)
+
+
+@pytest.mark.parametrize("title", ["Speeds", "Accelerations", "PositionErrors", "ActuatorForces", "run_1_controls"])
+def test_results_of_opensim_that_are_no_coordinates_are_refused(title, body, tmp_path):
+    """Their columns have the names of the coordinates."""
+    (tmp_path / "m.sto").write_text(opensim(title=title))
+    with pytest.raises(TrajectoryError, match=f"{title}.*Kinematics_q"):
+        read_recorded_motion(tmp_path / "m.sto", body)
 
 
 def test_a_first_row_of_whole_numbers_from_zero_may_be_a_sample(body, tmp_path):

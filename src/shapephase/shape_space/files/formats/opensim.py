@@ -16,6 +16,9 @@ END = "endheader"  # line that closes the header
 _HEADER_BYTES = 2**16  # searched for the header, which has a dozen lines
 # SIMM's older words for OpenSim's nRows and nColumns.
 _COUNTS = {"nrows": "rows", "datarows": "rows", "ncolumns": "columns", "datacolumns": "columns"}
+# First lines of results that are no coordinates, though their columns may have the names of coordinates.
+_OTHERS = ("speeds", "accelerations", "positionerrors", "actuatorforces", "actuatorpowers", "controls")
+_OF_MUSCLES = (".activation", ".fiber_length")  # states before OpenSim 4
 _SPREADSHEET = ",;"  # separators that a spreadsheet adds, behind header lines too
 
 
@@ -27,8 +30,9 @@ def has_header(data: bytes) -> bool:
 def read_opensim(where: Path, data: bytes) -> Table:
     """Motion in an OpenSim motion or storage file: header lines up to `endheader`, names, numbers.
 
-    `inDegrees` is the unit of rotational coordinates. In a file of states, `.../<coordinate>/value` is the coordinate
-    and `.../<coordinate>/speed` is left out. A spreadsheet puts commas between columns when it saves the file.
+    `inDegrees` is the unit of rotational coordinates. In a file of states, `.../<coordinate>/value` is the coordinate,
+    before OpenSim 4 its bare name; speeds (`.../speed`, `<coordinate>_u`) and states of muscles are left out. A
+    spreadsheet puts commas between columns when it saves the file.
     """
     text = unix_text(data, where)
     lines = text[:_HEADER_BYTES].decode(errors="replace").split("\n")
@@ -36,6 +40,12 @@ def read_opensim(where: Path, data: bytes) -> Table:
     if end is None:
         raise TrajectoryError(f"{where}: no line `{END}` closes the header; if it is no OpenSim file, name it .csv")
     header = _header(lines[:end], where)
+    title = header.get("", "")
+    if title.lower().endswith(_OTHERS):
+        raise TrajectoryError(
+            f"{where}: line 1: {title!r:.40}, and coordinates are needed; give the file with the motion, as "
+            "..._Kinematics_q.sto or the .mot file of inverse kinematics"
+        )
     mark = next((mark for mark in _SPREADSHEET if lines[end].rstrip().endswith(mark)), BLANKS)
     try:
         frame = read_text(where, text, start=end + 1, delimiter=mark)
@@ -56,15 +66,15 @@ def read_opensim(where: Path, data: bytes) -> Table:
     faults = {}
     for name, values in table.columns.items():
         parts = name.split("/")
-        is_state = len(parts) > 2 and parts[-1] in ("value", "speed")
-        if is_state and parts[-1] == "speed":
+        is_state, older = len(parts) > 2, name.removesuffix("_u")
+        if (is_state and parts[-1] != "value") or name.endswith(_OF_MUSCLES) or (older != name and older in columns):
             continue
         coordinate = parts[-2] if is_state else name
         if coordinate in columns:
             raise TrajectoryError(f"{where}: two columns are the coordinate {coordinate}, one is {name!r}; keep one")
         columns[coordinate] = values
         faults[coordinate] = table.faults.get(name, {})
-    return body_kinematics(replace(table, columns=columns, faults=faults, up="y"), header.get("", ""))
+    return body_kinematics(replace(table, columns=columns, faults=faults, up="y"), title)
 
 
 def _plain(line: str) -> str:
