@@ -76,8 +76,8 @@ def with_linked_names(text: str, names: dict[str, str], owner: str, own: set[str
 
     def code(found: re.Match[str]) -> str:
         name = _WHOLE_NAME.fullmatch(found[1])
-        meant = name and (name[1] not in own or found[1].startswith("shapephase."))
-        target = next((names[face + name[1]] for face in faces if face + name[1] in names), None) if meant else None
+        short = name[1] if name and (name[1] not in own or found[1].startswith("shapephase.")) else ""
+        target = next((names[face + short] for face in faces if face + short in names), None)
         return f":py:obj:`{found[1]} <{target}>`" if target and target != owner else f"``{found[1]}``"
 
     return outside_examples(text, lambda part: _BACKTICKS.sub(code, part))
