@@ -17,6 +17,7 @@ _LOG = logging.getLogger(__name__)
 from _site.code_links import with_links, with_targets
 from _site.coverage import write_tables
 from _site.docstrings import (
+    defaults_by_value,
     entries_are_descriptions,
     formulas_are_text,
     own_names,
@@ -29,7 +30,7 @@ from _site.equations import citing, with_citations
 from _site.executed_notebooks import library_digest, quiet_kernels, write_pages
 from _site.forked_kernels import fork_kernels
 from _site.gallery_rows import with_rows
-from _site.line_breaks import with_line_breaks
+from _site.line_breaks import contents_with_breaks, with_line_breaks
 from _site.live_pages import write_live_pages
 from _site.name_links import places, with_linked_names, with_names
 from _site.reference_pages import constant_documentation, write_reference
@@ -149,7 +150,14 @@ def _plain_docstring(_app: Sphinx, what: str, name: str, found: Any, _options: A
         lines[:] = constant_documentation(name) or lines
     text = returned_values_are_descriptions("\n".join(lines), returned_type(found))
     text = entries_are_descriptions(formulas_are_text(text))
-    lines[:] = with_linked_names(with_links(text), places(HERE / "reference"), name, own_names(found)).split("\n")
+    own = own_names(_owner(name) if what == "attribute" else found)
+    lines[:] = with_linked_names(with_links(text), places(HERE / "reference"), name, own).split("\n")
+
+
+def _owner(name: str) -> Any:
+    """The class that an attribute belongs to."""
+    module, _, owner = name.rpartition(".")[0].rpartition(".")
+    return getattr(sys.modules.get(module), owner, None)
 
 
 def _plain_signature(*event: Any) -> tuple[str, str] | None:
@@ -159,13 +167,15 @@ def _plain_signature(*event: Any) -> tuple[str, str] | None:
         return "", ""
     if not (signature or returned):
         return None
-    shown = types_by_name(signature or "")
+    shown = defaults_by_value(types_by_name(signature or ""), found)
     return public_parameters(shown) if what == "class" and shown else shown, types_by_name(returned or "")
 
 
 def _mark_line_breaks(_app: Sphinx, _page: str, _template: str, context: dict[str, Any], _tree: Any) -> None:
     if "body" in context:
         context["body"] = with_line_breaks(context["body"])
+    if "toc" in context:
+        context["toc"] = contents_with_breaks(context["toc"])
 
 
 def setup(app: Sphinx) -> None:

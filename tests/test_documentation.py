@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import doctest
 import importlib
@@ -14,6 +15,7 @@ import types
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -252,6 +254,61 @@ def test_lines_break_in_long_names_of_tables_and_headings_and_not_in_options_or_
         '<table><td><span class="pre">a_<wbr>b/<wbr>c.<wbr>py</span></td></table>'
         '<span class="pre"><span class="unbroken">--joint-noise</span></span>'
     )
+
+
+def test_signatures_numbers_and_names_of_a_page_break_where_they_should(steps):
+    made, parameter = steps("line_breaks"), '<em class="sig-param"><span class="pre">x</span></em>'
+    words = ["[", "tuple", "[", "Any", ",", "...", "]", ",", "dtype", "[", "int64", "]", "]"]
+    array = "".join(f'<span class="p"><span class="pre">{word}</span></span>' for word in words)
+    kept = '<span class="math notranslate nohighlight">\\( -x 1e-9\\)</span><pre>1e-9 -x</pre>'
+    signature = f'<dd>{parameter},</dd>{parameter}, <span class="pre">ndarray</span>{array}'
+    assert made.with_line_breaks(f'{signature} a-b (-pi, 2e-13] <a href="b-c 1e-9">-y</a>{kept}') == (
+        f'<dd>{parameter},</dd><span class="parameter">{parameter},</span> <span class="pre">Integers</span> a-b '
+        '(<span class="unbroken">-pi</span>, <span class="unbroken">2e-13</span>] '
+        f'<a href="b-c 1e-9">-y</a>{kept}'
+    )
+    assert made.contents_with_breaks('<a href="#a">body.link_poses</a>') == '<a href="#a">body.<wbr>link_<wbr>poses</a>'
+
+
+def test_defaults_in_signatures_are_numbers_and_not_private_constants(steps):
+    function = types.FunctionType((lambda: None).__code__, {"_SIZE": 0.25, "_BODY": object()})
+    shown = steps("docstrings").defaults_by_value("(a: int = _SIZE, b: Any = _BODY, c=ZXZ)", function)
+    assert shown == "(a: int = 0.25, b: Any = ..., c=ZXZ)"
+
+
+def test_products_without_blanks_are_products_and_names_and_file_endings_are_not(steps):
+    text = "E = Pi.I^-1 Pi/2 + n.(u x u'), (Pi x w).L_o at t.shape of a.csv; `w.mu` and so on.\n"
+    shown = "E = Pi · I^-1 Pi/2 + n · (u x u'), (Pi x w) · L_o at t.shape of a.csv; `w.mu` and so on.\n"
+    assert steps("docstrings").formulas_are_text(text) == shown
+
+
+def test_a_name_that_several_faces_have_links_to_that_of_the_owner(steps):
+    made, names = steps("name_links").with_linked_names, steps("name_links").places(DOCS / "reference")
+    link = ":py:obj:`extremal <shapephase.optimal_control.extremal>` of :py:obj:`shapephase.view <shapephase.view>`"
+    assert made("`extremal` of `shapephase.view`", names, "shapephase.optimal_control.shoot", {"view"}) == link
+    assert made("`extremal`", names, "shapephase.Motion.save", set()) == "``extremal``"
+
+
+def test_a_class_that_describes_some_of_its_fields_describes_all(steps):
+    pages = steps("reference_pages").questions(DOCS / "reference")
+    for found in {found for page in pages for found in page["objects"].values() if inspect.isclass(found)}:
+        text = inspect.getsource(found)
+        body = ast.parse(text).body[0].body
+        fields = [
+            (item.target.id, isinstance(below, ast.Expr) or "#:" in text.splitlines()[item.lineno - 1])
+            for item, below in pairwise([*body, None])
+            if isinstance(item, ast.AnnAssign) and item.target.id[0] != "_"
+        ]
+        assert len({described for _, described in fields}) < 2, (found, fields)
+
+
+def test_every_error_of_a_docstring_has_its_reason():
+    section = re.compile(r"^( *)(?:Raises|Warns)\n *-+\n((?:(?! *\"\"\").+\n)+)", re.MULTILINE)
+    for file in (DOCS.parent / "src").rglob("*.py"):
+        for found in section.finditer(file.read_text(encoding="utf-8")):
+            for line, below in pairwise([*found[2].splitlines(), found[1]]):
+                is_name = line[len(found[1])] != " "
+                assert not is_name or below.startswith(f"{found[1]} "), f"{file}: {line.strip()}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))

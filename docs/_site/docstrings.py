@@ -11,6 +11,7 @@ from typing import Any
 _LITERAL = re.compile(r"(``.+?``|`[^`]+`)", re.DOTALL)
 _EXAMPLE = re.compile(r"^ *>>> .*(?:\n(?! *$).*)*", re.MULTILINE)
 _DOT_PRODUCT = re.compile(r"(?<=\S) \. (?=\S)")
+_DENSE_PRODUCT = re.compile(r"((?<![\w./])(?:Pi|Omega|omega|Gamma|L_o|mu|F_[qp]|K|[unwp])|\))\.(?=\(|[A-Z]|[a-z]+'?\b)")
 _ENTRY = re.compile(r"([\w*, ]+) : (.*)")
 # What Sphinx shows in place of names: the members of NumPy's union, its arrays, and defaults that dataclasses make.
 _PREFIX = r"~?(?:[a-z_]\w*\.)*"
@@ -20,6 +21,7 @@ _SPELT_OUT = (
     (rf"{_PREFIX}ndarray\[tuple\[{_PREFIX}Any, \.\.\.\], {_PREFIX}dtype\[{_PREFIX}int64\]\]", "Integers"),
     ("<factory>", "..."),
 )
+_CONSTANT = re.compile(r"(?<== )_?[A-Z][A-Z0-9_]{2,}\b")
 _TYPE_ALONE = re.compile(r"[\w.]+\n    ")
 _WITH_ENTRIES = ("Parameters", "Attributes", "Other Parameters")
 
@@ -32,7 +34,7 @@ def formulas_are_text(text: str) -> str:
 def _formula(part: str, prose: bool) -> str:
     for written, shown in (("|", "\\|"), ("...", "…"), ("->", "→")) if prose else ():
         part = part.replace(written, shown)
-    return _DOT_PRODUCT.sub(" · ", part) if prose else part
+    return _DENSE_PRODUCT.sub(r"\1 · ", _DOT_PRODUCT.sub(" · ", part)) if prose else part
 
 
 def outside_examples(text: str, change: Callable[[str], str]) -> str:
@@ -94,9 +96,23 @@ def public_parameters(signature: str) -> str:
     return f"({','.join(part for part in parts if not part.lstrip().startswith('_')).lstrip()})"
 
 
+def defaults_by_value(signature: str, found: Any) -> str:
+    """A signature with numbers in place of the constants of the function's module; private objects are left out."""
+    constants = getattr(inspect.unwrap(found), "__globals__", {})
+
+    def value(name: re.Match[str]) -> str:
+        if isinstance(constants.get(name[0]), int | float | tuple):
+            return repr(constants[name[0]])
+        return "..." if name[0].startswith("_") else name[0]
+
+    return _CONSTANT.sub(value, signature)
+
+
 def own_names(found: Any) -> set[str]:
     """Parameters of a function, or members of a class and parameters of its constructor."""
-    names = {name for name in dir(found) if not name.startswith("_")} if inspect.isclass(found) else set()
+    classes = inspect.getmro(found) if inspect.isclass(found) else ()
+    members = [name for found in classes for name in (*vars(found), *vars(found).get("__annotations__", ()))]
+    names = {name for name in members if not name.startswith("_")}
     try:
         return names | {*inspect.signature(found).parameters}
     except (TypeError, ValueError):

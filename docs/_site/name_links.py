@@ -15,7 +15,7 @@ from .reference_pages import questions
 _FENCE = re.compile(r"^(```|:::)")
 # What pages mean otherwise: attributes of a motion, and a folder.
 _OTHERWISE = {"angular_velocity", "body_momentum", "rigid_body"}
-_NAME = r"(?:sp\.)?([A-Za-z]\w+(?:\.\w+)*)(?:\(\))?"
+_NAME = r"(?:sp\.|shapephase\.)?([A-Za-z]\w+(?:\.\w+)*)(?:\(\))?"
 _CODE = re.compile(rf"(?<![`\w}}])`{_NAME}`(?!`)")
 _MEMBERS = (property, cached_property, classmethod, staticmethod)
 # Of reStructuredText: neither a role's text nor a literal.
@@ -68,12 +68,16 @@ def _link(found: re.Match[str], names: dict[str, str]) -> str:
 def with_linked_names(text: str, names: dict[str, str], owner: str, own: set[str]) -> str:
     """A docstring in which what stands in single backticks is code, and a link where it is a name of the reference.
 
-    `own` names, parameters and members of what it documents, are not links, nor is its `owner`.
+    `own` names, parameters and members of what it documents, are not links, nor is its `owner`. A name that several
+    faces have is the one of the owner's face.
     """
+    parts = owner.split(".")[1:-1]
+    faces = [".".join([*parts[:count], ""]) for count in range(len(parts), -1, -1)]
 
     def code(found: re.Match[str]) -> str:
         name = _WHOLE_NAME.fullmatch(found[1])
-        target = names.get(name[1]) if name and name[1] not in own else None
+        short = name[1] if name and (name[1] not in own or found[1].startswith("shapephase.")) else ""
+        target = next((names[face + short] for face in faces if face + short in names), None)
         return f":py:obj:`{found[1]} <{target}>`" if target and target != owner else f"``{found[1]}``"
 
     return outside_examples(text, lambda part: _BACKTICKS.sub(code, part))

@@ -49,7 +49,7 @@ class AirbornePart:
     Attributes
     ----------
     first, past : samples, the last one left out
-    how : for people
+    how : how they were found, in words
     acceleration : of the centre of mass there, world axes [m/s^2]; None where places are not known
 
     Examples

@@ -180,7 +180,7 @@ class Audit:
 
     @property
     def right(self) -> bool:
-        """Whether all runs are, and their samples would have shown a fault beyond the tolerance."""
+        """True where all runs are right, and their samples would have shown a fault beyond the tolerance."""
         return all(run.right and run.decided for run in self.runs)
 
     @property
@@ -190,7 +190,7 @@ class Audit:
 
     @property
     def verdict(self) -> str:
-        """In a line."""
+        """The result in one line."""
         recorded = [run.words for run in self.runs if run.recorded]
         shown = "; ".join(recorded)
         if not self.wrong and not self.right:

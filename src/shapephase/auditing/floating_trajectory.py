@@ -74,7 +74,7 @@ class FloatingTrajectory:
     joint_rates : (N, n) derivatives of the shapes [rad/s or m/s], or None
     rate_axes, velocity_axes : "world" or "base": in which axes these two are
     integrator_step : of the integrator that made it [s]; None: that between samples
-    name : for people
+    name : label in messages and figures
     joint_order : of arrays without names, in which order their joints were taken, in words; None: they had names
     certain : what the format of its file leaves no doubt about, which is no hypothesis: "units" of the joints, "order"
         of the base's quaternion, "direction" of its attitude

@@ -73,11 +73,11 @@ class FittedValue:
 
 @dataclass(frozen=True, kw_only=True)
 class Hypothesis:
-    """A cause, fitted.
+    """Possible cause of a difference, fitted to the samples.
 
     Attributes
     ----------
-    name : for people, as "mass of head"
+    name : in messages and figures, such as "mass of head"
     kind : "inertia", "torque", "force", "time", "filter", "frame", "quaternion", "units", "engine", "step",
         "drag", "offset" or "gravity"
     square : what is left over, squared and summed in units of the noise

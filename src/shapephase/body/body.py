@@ -94,8 +94,8 @@ class Body(ShapeArguments):
     link_names : of all links, those fixed to others included
     mass : [kg]
     joint_limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
-    rate_limits : (n,) the largest rates that the file states [rad/s or m/s], infinite where it states none, or zero
-    effort_limits : (n,) the same of the torques or forces of their motors [N m or N]
+    rate_limits : (n,) the largest rates that the file states [rad/s or m/s], infinite where it states none or zero
+    effort_limits : (n,) the largest torques or forces of their motors that it states [N m or N]
     joint_units : "rad" or "m" for each joint, "1" for the four numbers of a ball joint, which may have any length: the
         joint's turn is that of the quaternion of length one
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
@@ -455,7 +455,7 @@ class Body(ShapeArguments):
 
         Notes
         -----
-        Raises as `locked_inertia`. Equation :eq:`internal-momentum` of the documentation.
+        Raises like `locked_inertia`. Equation :eq:`internal-momentum` of the documentation.
         Source: theory.md A7.
         """
         r = self._checked(shape)
@@ -522,7 +522,7 @@ class Body(ShapeArguments):
     def link_angular_velocity(self, shape: ArrayLike, rate: ArrayLike, link: str) -> Array:
         """Angular velocity of a link relative to the base: (..., n), (..., n) -> (..., 3), base axes [rad/s].
 
-        Raises as `link_pose`.
+        Raises like `link_pose`.
         """
         frame = self._link_frame(link)
         r, v = self._pair(shape, rate)

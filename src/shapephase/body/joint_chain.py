@@ -96,7 +96,7 @@ class JointChain:
 
     @property
     def offset(self) -> Array:
-        """(k,) [rad or m]."""
+        """Coordinates of the joints at the shape zero: (k,) [rad or m]."""
         return self.follows.offset
 
     @property

@@ -46,9 +46,9 @@ class AzimuthBounds:
 
     sense: float
     """+1 counterclockwise seen from the tip of the axis ("about axis 3"), -1 clockwise ("about axis 1")."""
-    slow: Array
+    slow: Array  #: (K,) lower bound of sense times the azimuth's rate [rad/s]; -inf where Pi may be on the axis.
     fast: Array
-    """`slow` and `fast`: (K,) of sense times the azimuth's rate [rad/s]; infinite where Pi may be on the axis."""
+    """(K,) upper bound of sense times the azimuth's rate [rad/s]; infinite where Pi may be on the axis."""
     monotone: bool
     """Whether the azimuth is certain to change in one sense throughout."""
 

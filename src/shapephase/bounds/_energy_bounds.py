@@ -40,12 +40,12 @@ class EnergyBounds:
     """l, the momentum's norm [kg m^2/s]."""
     initial: Array
     """(2,) bounds of E at the start of the interval, apart by rounding and the error of sampling [J]."""
-    lower: Array
+    lower: Array  #: (K,) lower bound of E on each cell [J].
     upper: Array
-    """`lower` and `upper`: (K,) of E on each cell [J]."""
-    rate_lower: Array
+    """(K,) upper bound of E on each cell [J]."""
+    rate_lower: Array  #: (K,) lower bound of dE/dt on each cell [W].
     rate_upper: Array
-    """`rate_lower` and `rate_upper`: (K,) of dE/dt [W]."""
+    """(K,) upper bound of dE/dt on each cell [W]."""
 
     __repr__ = short_repr
 
@@ -88,7 +88,7 @@ def energy_bounds(
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
     attitude : (3, 3) at the start of the interval; None: the identity
     interval : (start, end) [s]; None: [0, duration]
-    resolution : as for `enclosure`
+    resolution : least relative change of the channels for which a cell of time is halved; smaller is sharper and slower
 
     Examples
     --------

@@ -110,7 +110,7 @@ def solid_angle_bounds(certificate: RegimeCertificate) -> PhaseBounds:
 def loop_phase_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     """Bounds of theta_M before the motion is computed, if Pi closes once round the axis just at the interval's end.
 
-    Raises as `solid_angle_bounds`. Source: theory.md E13, E8.
+    Raises like `solid_angle_bounds`. Source: theory.md E13, E8.
 
     Examples
     --------

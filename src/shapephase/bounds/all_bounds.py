@@ -68,7 +68,7 @@ def bounds(
     ----------
     motion : of one momentum, no batch
     interval : (start, end) [s]; None: [0, duration]
-    resolution : as for `enclosure`
+    resolution : least relative change of the channels for which a cell of time is halved; smaller is sharper and slower
 
     Examples
     --------

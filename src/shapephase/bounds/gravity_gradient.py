@@ -181,7 +181,7 @@ class GravityTorque:
     """First-order effect of the neglected gravity-gradient torque on a motion. Made by `gravity_torque_estimate`."""
 
     largest_torque: float
-    """[N m]."""
+    """Largest gravity-gradient torque along the motion [N m]."""
     impulse: float
     """The largest change of the angular momentum [kg m^2/s]."""
     attitude_error: float

@@ -169,7 +169,7 @@ def regime_certificate(
 
     No motion is computed: E_t, and the energy at which Pi could cross to the other side, are bounded over the interval.
 
-    Raises as `energy_bounds`.
+    Raises like `energy_bounds`.
 
     Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.
 
@@ -178,7 +178,7 @@ def regime_certificate(
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
     attitude : (3, 3) at the start of the interval; None: the identity
     interval : (start, end) [s]; None: [0, duration]
-    resolution : as for `enclosure`; smaller is sharper and slower
+    resolution : least relative change of the channels for which a cell of time is halved; smaller is sharper and slower
 
     Examples
     --------

@@ -204,7 +204,7 @@ def is_without_momentum(motion: str, options: StartOptions) -> bool:
 
 
 def body_argument(body: str, floating: BodyOptions) -> Body:
-    """Return the body of a command. Raises as `load_body`, and ShapeError for a motion in its place."""
+    """Return the body of a command. Raises like `load_body`, and ShapeError for a motion in its place."""
     is_file = os.path.isfile(body)
     if (body in MOTIONS and not is_file) or (is_file and Path(body).suffix.lower() in _OF_MOTIONS):
         raise ShapeError(

@@ -67,7 +67,7 @@ class Deformation:
     closure : (3, 3) where the shape at the end is the one at the start turned by it (the identity for a closed
         joint path seen from the base), else None
     shape_gap : how far the end shape is from the start shape [largest joint difference, or relative change]
-    label : what it is, for people
+    label : what it is, in messages and figures
     loops : the deformation is its first `duration / loops` seconds, this many times
     inputs : SHA-256 of the files it was made from, "body" and "path", if it was made from files
     made_from : the body, its joints, the recording and what was done to it, as JSON can hold it: for `provenance`
@@ -96,7 +96,7 @@ class Deformation:
     def breaks(self) -> Array:
         """Times between which all is smooth, those that the scan found among them: (M,), first 0, last `duration` [s].
 
-        Raises and warns as `scan`.
+        Raises and warns like `scan`.
         """
         scan = self.scan
         if scan is None or not len(scan.found_breaks):
@@ -208,7 +208,7 @@ class Deformation:
     def sampler(self) -> Sampler:
         """A fresh sampler for the integrator, after the scan of a user's functions of time.
 
-        Raises SingularInertiaError for particles that are on one line at some time; raises and warns as `scan`.
+        Raises SingularInertiaError for particles that are on one line at some time; raises and warns like `scan`.
         """
         known = self.description
         return Sampler(known.sample, known.smoothness(self.breaks), known.channels)

@@ -70,7 +70,7 @@ class Description(Protocol):
         ...
 
     def kinetic_energy(self, times: Array, turning: Array, /) -> Array:
-        """Energy with this frame turning at (B, N, 3) [rad/s]: -> (B, N) [J]; GaugeError as `correlation`."""
+        """Energy with this frame turning at (B, N, 3) [rad/s]: -> (B, N) [J]; GaugeError like `correlation`."""
         ...
 
     def link_frames(self, times: Array, link: str, /) -> tuple[Array, Array]:
@@ -81,7 +81,7 @@ class Description(Protocol):
     def scan(self) -> FunctionScan | None:
         """Scan of the user's functions, done when first needed; None where all is known.
 
-        A motion in loops has that of the first. Raises and warns as `ShapePath.scan`.
+        A motion in loops has that of the first. Raises and warns like `ShapePath.scan`.
         """
         ...
 

@@ -73,12 +73,12 @@ class GivenFrames:
 
     @property
     def panel_ends(self) -> Array:
-        """Times between which U is a short series, found by its scan: (P + 1,) [s]. Raises and warns as `scanned`."""
+        """Times between which U is a short series, found by its scan: (P + 1,) [s]. Raises and warns like `scanned`."""
         return scanned(self.function, self.breaks).resolved.edges
 
 
 def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> GivenFrames:
-    """A user's U(t) with its rates, differentiated where it comes without. Raises as `in_gauge`."""
+    """A user's U(t) with its rates, differentiated where it comes without. Raises like `in_gauge`."""
     if not callable(u) or isinstance(u, type):
         raise ShapeError(f"a gauge u is a function of times, got {value_text(u)}")
     if _turns_of(u, breaks[:1])[1] is None:
@@ -192,7 +192,7 @@ def _differentiated(u: Callable[[Array], Any], breaks: Array) -> GivenFrames:
 
 
 def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start: ArrayLike | None) -> GivenFrames:
-    """U(t) from its body rates: the lift of a unit inertia that carries minus the rate. Raises as `in_gauge`."""
+    """U(t) from its body rates: the lift of a unit inertia that carries minus the rate. Raises like `in_gauge`."""
     if not callable(rates):
         raise ShapeError(f"the body rates of a gauge are a function of times, got {value_text(rates)}")
 
@@ -238,7 +238,7 @@ def _check_rates(frames: Frames, breaks: Array) -> None:
 
 
 def link_frames(deformation: Deformation, link: str) -> Frames:
-    """U(t) and its body rates of the frame of a link. Raises as `link_gauge`."""
+    """U(t) and its body rates of the frame of a link. Raises like `link_gauge`."""
     frames = _LinkFrames(deformation.description, link)
     frames(deformation.breaks[:1])
     return frames
@@ -332,6 +332,6 @@ def gauge_link(name: str) -> str | None:
 
 
 def named_frames(deformation: Deformation, name: str) -> Frames:
-    """U(t) and its body rates of a gauge that is neither the base nor the horizontal one. Raises as `named_gauge`."""
+    """U(t) and its body rates of a gauge that is neither the base nor the horizontal one. Raises like `named_gauge`."""
     link = gauge_link(name)
     return _NAMED[name](deformation) if link is None else link_frames(deformation, link)

@@ -157,7 +157,7 @@ def mean_body_gauge(deformation: Deformation, reference: float = 0.0) -> Deforma
 
 
 def named_gauge(deformation: Deformation, name: str) -> Deformation:
-    """The deformation in one of `GAUGES` or "link:NAME". Raises UnknownNameError, and as the gauge itself.
+    """The deformation seen from a gauge by its name, or "link:NAME". Raises UnknownNameError and the gauge's errors.
 
     Examples
     --------

@@ -316,7 +316,7 @@ def _rotor(body: Body, joint: str, value: float | ShapePath, is_momentum: bool) 
 
 
 def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> ShapePath:
-    """A path of the other joints with columns for all, those left out at zero. Raises as `ShapePath.matched`."""
+    """A path of the other joints with columns for all, those left out at zero. Raises like `ShapePath.matched`."""
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     others = [name for name in body.joint_names if name not in left_out]

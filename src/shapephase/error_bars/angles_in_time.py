@@ -54,7 +54,7 @@ def somersault_bars(
 
     Notes
     -----
-    Raises as `uncertainty` and `Motion.athlete_axes`, too. Equations :eq:`added-momentum` and :eq:`moved-fit` of the
+    Raises like `uncertainty` and `Motion.athlete_axes`, too. Equations :eq:`added-momentum` and :eq:`moved-fit` of the
     documentation, for the attitude at each time.
 
     Examples

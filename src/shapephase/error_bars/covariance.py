@@ -138,7 +138,7 @@ def uncertainty(
     ----------
     motion : of an articulated body; under a torque that is a function of time alone, whose bars are those of the state
         at the end
-    joints : of the samples that the path is made of: the standard deviation of white noise, one or one for each
+    joints : of the samples that the path is made of: the standard deviation of white noise, one number or one for each
         joint (n,) [rad or m], or a text such as "0.3deg" or "0.3deg,1mm"; or the covariance (N n, N n) of all samples,
         row by row; for a periodic path without the last, which is the first. For a recording that was closed, smoothed
         or resampled, all samples as recorded, with those before and after a flight that were smoothed with it; joints
@@ -228,7 +228,7 @@ def sampled_uncertainty(
 
     Notes
     -----
-    Raises as `uncertainty` and `reconstruct`.
+    Raises like `uncertainty` and `reconstruct`.
 
     Examples
     --------

@@ -214,7 +214,7 @@ def dop853_attitude(
 ) -> DrivenAttitude:
     """S(t) for one Pi_0 by SciPy's DOP853 on the quaternion, restarted at the breaks, with its measured error.
 
-    Every stage evaluates the deformation itself, an independent check of `integrate`. Raises as `driven_attitude`.
+    Every stage evaluates the deformation itself, an independent check of `integrate`. Raises like `driven_attitude`.
     """
 
     def rates(times: Array, attitudes: Array, states: Array) -> tuple[Array, Array]:

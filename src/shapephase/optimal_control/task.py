@@ -187,7 +187,7 @@ class Reorientation:
 
 
 def motion_along(task: Reorientation, path: ShapePath, tolerance: float) -> Motion:
-    """Return the motion of a task's body along a path, to a tolerance [rad]. Raises as `reconstruct`."""
+    """Return the motion of a task's body along a path, to a tolerance [rad]. Raises like `reconstruct`."""
     along = deformation_along(task.links, route_along(task.body, path))
     return reconstruct(along, task.momentum, tolerance=tolerance)
 

@@ -166,7 +166,7 @@ def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
 
 
 def _frames(deformation: Deformation, gauge: Gauge) -> Callable[[Array], tuple[Array, Array]]:
-    """U(t) of a gauge and its body rates: (N,) -> (N, 3, 3), (N, 3). Raises as `split`."""
+    """U(t) of a gauge and its body rates: (N,) -> (N, 3, 3), (N, 3). Raises like `split`."""
     if isinstance(gauge, str) and gauge == "base":
         return lambda t: (np.broadcast_to(np.eye(3), (len(t), 3, 3)), np.zeros((len(t), 3)))
     seen: Any = named_gauge(deformation, gauge) if isinstance(gauge, str) else in_gauge(deformation, gauge)

@@ -56,7 +56,7 @@ def momentum_connection(momentum: ArrayLike, attitude: ArrayLike, angular_veloci
 
     Notes
     -----
-    Source: Cabrera 2006 (11); theory.md D2. Other arguments and errors as `momentum_generator`.
+    Source: Cabrera 2006 (11); theory.md D2. Other arguments and errors are those of `momentum_generator`.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def momentum_curvature(momentum: ArrayLike, attitude: ArrayLike, first: ArrayLik
 
     Notes
     -----
-    Source: Cabrera 2006, section 3.2.1; theory.md D3. Other arguments and errors as `momentum_generator`.
+    Source: Cabrera 2006, section 3.2.1; theory.md D3. Other arguments and errors are those of `momentum_generator`.
 
     Examples
     --------

@@ -75,7 +75,7 @@ class PhaseSplit:
     momentum_gap : angle between the ends of the momentum curve in this gauge [rad]
     closing_phase : part of the geometric phase by the closing great circle; the momentum itself sweeps the rest, about
         the direction opposite the excluded region [rad]
-    shape_gap : distance of the end shape from the start shape
+    shape_gap : that of the `Deformation`: largest joint difference [rad or m], or relative change
     residual : |theta_M - the same angle read off the attitude|, modulo 2 pi: two independent computations [rad]
     is_loop : whether the shape closes
     has_phase : whether there is angular momentum; without it all phases are 0, R_D is R_W and R_M the identity

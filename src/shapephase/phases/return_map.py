@@ -195,7 +195,7 @@ def fixed_points(
     tolerance : of the attitude [rad]; None: 1e-11, or where errors grow too much along the loop for that, the first of
         1e-10, 1e-9 and 1e-8 that can be met; `FixedPoints.tolerance` says which
     most_directions : 1000 or more at which the map is evaluated, in each of the three searches; about ten seconds
-        for 100 000
+        for 100,000
     progress : as for `reconstruct`
 
     Raises

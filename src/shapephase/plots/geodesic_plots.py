@@ -303,6 +303,7 @@ def plot_caustic(
     Raises
     ------
     MissingExtraError, ShapeError, AccuracyNotReached
+        Without Matplotlib; for moments or an order for which there are no conjugate points, or none are found.
 
     Notes
     -----

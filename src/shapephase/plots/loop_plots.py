@@ -105,7 +105,7 @@ class LoopFlux:
 
 
 def loop_flux(body: Body, path: ShapePath, joints: Sequence[str | int] | str | None = None) -> LoopFlux:
-    """Return what a loop encloses and the turn that it makes. Arguments and errors as `plot_loop`."""
+    """Return what a loop encloses and the turn that it makes. Arguments and errors like `plot_loop`."""
     route = route_along(body, path)
     check_smooth(body.chain.follows, "the curvature needs")
     check_closed(body, route)

@@ -83,6 +83,7 @@ def plot_momentum_curve(
     Raises
     ------
     MissingExtraError, UnknownNameError, GaugeError
+        Without Matplotlib; for a gauge that `split` refuses.
     ShapeError
         If the motion is a batch, or has no momentum.
 

@@ -161,14 +161,14 @@ def check_axes(ax: object) -> None:
 
 
 def check_flat_axes(ax: object) -> None:
-    """Check that these are two-dimensional Matplotlib axes. Raises as `check_axes`."""
+    """Check that these are two-dimensional Matplotlib axes. Raises like `check_axes`."""
     check_axes(ax)
     if getattr(ax, "name", "") == "3d":
         raise ShapeError("ax: flat axes are needed here, got three-dimensional ones; make them without a projection")
 
 
 def check_motion_axes(ax: object, motion: Motion) -> None:
-    """Check that these are flat axes for one motion. Raises as `check_axes`, WrongObjectError, ShapeError."""
+    """Check that these are flat axes for one motion. Raises like `check_axes`, WrongObjectError, ShapeError."""
     check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
     one_motion(motion)

@@ -35,11 +35,11 @@ class Solution(Protocol):
 
     @property
     def error_estimate(self) -> Array:
-        """(B,) [rad]."""
+        """Estimate of the largest attitude error: (B,) [rad]."""
         ...
 
     def rotation(self, t: Array, /) -> Array:
-        """(N,) -> (B, N, 3, 3)."""
+        """S(t): times (N,) -> (B, N, 3, 3)."""
         ...
 
 
@@ -58,11 +58,11 @@ class Dop853Rotation:
 
     @property
     def error_estimate(self) -> Array:
-        """(B,) [rad]."""
+        """Estimate of the largest attitude error: (B,) [rad]."""
         return np.array([turn.attitude_errors[-1] for turn in self.turns])
 
     def rotation(self, t: Array) -> Array:
-        """(N,) -> (B, N, 3, 3)."""
+        """S(t): times (N,) -> (B, N, 3, 3)."""
         return np.stack([turn.attitude(t) for turn in self.turns])
 
 

@@ -87,7 +87,7 @@ def write_forced_record(motion: ForcedMotion, path: str | os.PathLike[str]) -> N
 
 
 def read_forced_record(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read the fields of a `ForcedMotion` from a file of `write_forced_record`. Raises as `read_motion_record`."""
+    """Read the fields of a `ForcedMotion` from a file of `write_forced_record`. Raises like `read_motion_record`."""
     return read_record(path, FORCED_FORMAT, _record)
 
 

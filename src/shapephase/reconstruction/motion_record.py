@@ -159,7 +159,7 @@ def read_record(
 ) -> dict[str, Any]:
     """Read the fields of a motion from a file of the known format, made of its header and arrays.
 
-    Raises as `read_motion_record`.
+    Raises like `read_motion_record`.
     """
     where = Path(path)
     if not where.is_file():

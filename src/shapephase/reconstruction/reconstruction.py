@@ -237,7 +237,7 @@ class Motion(MotionViews):
 
     @cached_property
     def error_turns(self) -> Array:
-        """Estimated attitude errors at the ends of steps (`integrator.lift.error_turns`)."""
+        """Attitude errors at the ends of steps by stepping and by sampling, base axes: (2, B, K + 1, 3) [rad]."""
         assert isinstance(self.stepped, SteppedRotation), "a batch has one array for each part"
         return read_only(error_turns(self.stepped, self.lift_without_momentum))
 
@@ -275,8 +275,8 @@ class Motion(MotionViews):
 
         Times (...) -> batch + (...) [sr]; zero without momentum. It grows continuously from zero as long as Pi keeps
         away from the point opposite its start, where it jumps by 4 pi: at the end of the motion it is that of
-        `split(motion, "base")` up to multiples of 4 pi, as exactly, and dynamic_phase - solid_angle turns the start
-        into the attitude, up to the transport along the great circle.
+        `split(motion, "base")` up to multiples of 4 pi, to the same accuracy, and dynamic_phase - solid_angle turns the
+        start into the attitude, up to the transport along the great circle.
 
         Source: theory.md D; numerics.md section 3.
         """

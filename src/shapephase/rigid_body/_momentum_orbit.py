@@ -42,10 +42,9 @@ class MomentumOrbit:
     """|Pi| [kg m^2/s]."""
     regime: str
     """ "rest", "spherical", "steady", "axisymmetric", "circling" or "separatrix"."""
-    circled: int = -1
+    circled: int = -1  #: Index k of the axis that Pi circles, 0 or 2; -1 where it stands still and circles nothing.
     other: int = -1
-    """`circled` and `other`: the indices k and a, 0 and 2 or 2 and 0; both -1 where Pi stands still and circles
-    nothing."""
+    """Index a of the other one of these two axes, 2 or 0; -1 where Pi stands still and circles nothing."""
     direction: Array
     """(3,) ê, the unit vector along the axis circled, on Pi's side; Pi's own where it circles nothing."""
     amplitudes: Array
@@ -53,9 +52,9 @@ class MomentumOrbit:
     rate: float = 0.0
     """Rate of u [rad/s]; 0 where Pi circles nothing."""
     complement: float
-    """m1."""
+    """m1 = 1 - k^2 of the elliptic functions."""
     phase: float = 0.0
-    """u0."""
+    """u0, argument of the elliptic functions at t = 0."""
     characteristic: float = 0.0
     """n <= 0 of the integral of the third kind in the azimuth and the attitude, by the moments only."""
     spin: float
@@ -63,7 +62,7 @@ class MomentumOrbit:
     excess: float = 0.0
     """2 E/L − L/I_2, by which the turn about Pi differs from it [rad/s]; 0 on the separatrix."""
     precession: float = 0.0
-    """(L/I_a − L/I_k)/rate."""
+    """(L/I_a − L/I_k)/rate [1]."""
     sense: float = 0.0
     """+1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still."""
     condition: float

@@ -29,9 +29,9 @@ from .lagrange_top import LagrangeTop
 class Nutation:
     """Rise and fall of a Lagrange top's axis. Made by `nutation`."""
 
-    lowest: float
+    lowest: float  #: Least cos(theta).
     highest: float
-    """`lowest` and `highest`: the range of cos(theta)."""
+    """Largest cos(theta)."""
     third_root: float
     """The root of the cubic above this range, >= 1."""
     rate: float

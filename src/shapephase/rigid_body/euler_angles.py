@@ -45,7 +45,7 @@ class EulerChart:
     [0.1 0.2 0.3]
     """
 
-    name: str
+    name: str  #: "ZXZ" or "ZYZ".
     node: tuple[float, float]
     """The x and y components of the axis of the middle turn."""
 

@@ -195,7 +195,7 @@ class HeavyTopMotion:
     top: HeavyTop
     """The `HeavyTop`."""
     duration: float
-    """[s]."""
+    """Duration of the motion [s]."""
     vertical_momentum: Array
     """(...) Pi.Gamma, constant [kg m^2/s]."""
     error_estimate: Array

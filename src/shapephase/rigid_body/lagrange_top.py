@@ -69,10 +69,10 @@ class SleepingTop:
 
     momentum: float
     """p = Pi_3 [kg m^2/s]."""
-    phi_dot: float
-    phi_prime: float
+    phi_dot: float  #: Phi_dot that makes the first variation vanish.
+    phi_prime: float  #: Phi' that makes it vanish.
     axial_slope: float
-    """`phi_dot`, `phi_prime` and `axial_slope`: Phi_dot, Phi' and phi'(p) that make the first variation vanish."""
+    """phi'(p) that makes it vanish."""
     first_variation: Array
     """(6,) gradient of the conserved quantity by (Pi, Gamma) at the equilibrium; zero."""
     second_variation: Array
@@ -106,10 +106,10 @@ class StabilityChart:
     """(R,) I3/I1."""
     momenta: Array
     """(P,) Pi_3 in units of sqrt(Mgl I1); the threshold is 2."""
-    energy_casimir: Mask
-    spectrum: Mask
+    energy_casimir: Mask  #: (R, P) True where the energy-Casimir method finds the spin stable.
+    spectrum: Mask  #: (R, P) True where the spectrum does.
     simulation: Mask
-    """`energy_casimir`, `spectrum` and `simulation`: (R, P) True where the method finds the spin stable."""
+    """(R, P) True where the simulation does."""
     largest_tilt: Array
     """(R, P) of the simulated motions [rad]."""
 
@@ -345,7 +345,7 @@ def stability_chart(
     ShapeError
         If the ratios or momenta are not lists, or tilt and duration are outside their limits.
     AccuracyNotReached
-        If the simulation needs more than 200 000 steps.
+        If the simulation needs more than 200,000 steps.
 
     Examples
     --------

@@ -63,9 +63,9 @@ class RigidBodyPendulum:
     """(3,) principal moments as given [kg m^2]."""
     axes: tuple[int, int, int]
     """Which of the principal axes are called 1, 2, 3; the cylinders are about the third."""
-    k1: float
+    k1: float  #: k_1 [sqrt(kg) m]: Pi_1 = k_1 r cos(theta).
     k2: float
-    """`k1` and `k2` [sqrt(kg) m]: Pi_1 = k_1 r cos(theta) and Pi_2 = k_2 r sin(theta)."""
+    """k_2 [sqrt(kg) m]: Pi_2 = k_2 r sin(theta)."""
     inverse_square_k3: float
     """1/k_3^2: N = p^2/2 + (k_2 r)^2/(2 k_3^2) sin^2(theta). Negative if theta = 0 is the unstable one."""
     stiffness: float
@@ -222,7 +222,7 @@ class RigidBodyPendulum:
 class PendulumMotion:
     """Motion of the pendulum, and of the rigid body, in closed form. Made by `RigidBodyPendulum.motion`."""
 
-    pendulum: RigidBodyPendulum
+    pendulum: RigidBodyPendulum  #: The pendulum that moves.
     radius: float
     """r, of the cylinder."""
     regime: str

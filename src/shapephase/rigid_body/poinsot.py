@@ -36,7 +36,7 @@ class Closure:
     """
 
     turns: int
-    """About mu."""
+    """Number of turns about mu."""
     lobes: int
     """Waves between the two circles that the herpolhode touches."""
     gap: float

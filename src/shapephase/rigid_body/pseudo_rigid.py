@@ -174,7 +174,7 @@ class PseudoRigidMotion:
     body: PseudoRigidBody
     """The `PseudoRigidBody`."""
     duration: float
-    """[s]."""
+    """Duration of the motion [s]."""
     momentum: Array
     """(3,) angular momentum, inertial axes, constant [kg m^2/s]."""
     error_estimate: float
@@ -239,7 +239,7 @@ class PseudoRigidSpin:
     rate: float
     """Omega [rad/s]."""
     stretches: Array
-    """(3,) q."""
+    """(3,) q, the stretches along the principal axes."""
     curvatures: Array
     """(8,) second derivatives of the amended potential V + mu.I(Q)^-1 mu/2, ascending, across the turn about the
     momentum, to which it is indifferent [J]."""

@@ -37,10 +37,9 @@ class SteadyRotation:
     """(3,) the equilibrium Pi_e, body axes [kg m^2/s]."""
     moment: float
     """I_e, the moment of inertia about it [kg m^2]."""
-    slope: float
+    slope: float  #: Phi' at |Pi_e|^2/2 of the Casimir Phi that is added to the energy, see `casimir`.
     curvature: float
-    """`slope` and `curvature`: Phi' and Phi'' at |Pi_e|^2/2 of the Casimir Phi that is added to the energy, see
-    `casimir`."""
+    """Phi'' at |Pi_e|^2/2 of this Casimir."""
     first_variation: Array
     """(3,) gradient of H + Phi at Pi_e, Omega + Phi' Pi; zero by the choice of the slope [rad/s]."""
     second_variation: Array
@@ -206,7 +205,7 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
     equilibria, and the axis away from the momentum.
 
     Source: Marsden and Ratiu, section 15.9, remark 3 (theory.md L7); M-E1 and M-E7 for the farthest point.
-    Raises ShapeError, UnphysicalInertiaError, SingularInertiaError as `steady_rotation`; also if `disturbed` is zero.
+    Raises ShapeError, UnphysicalInertiaError, SingularInertiaError like `steady_rotation`; also if `disturbed` is zero.
 
     Parameters
     ----------

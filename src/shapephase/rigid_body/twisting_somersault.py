@@ -53,9 +53,9 @@ class RotorDive:
     """l, about +y in inertial axes [kg m^2/s]."""
     rotor: float
     """h, about x, in the second stage [kg m^2/s]."""
-    somersaults: float
+    somersaults: float  #: m, number of somersaults.
     twists: float
-    """`somersaults` and `twists`: m and n."""
+    """n, number of twists."""
     times: Array
     """(6,) at which the stages begin and the dive ends [s]."""
     turns: Array

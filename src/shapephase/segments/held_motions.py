@@ -166,7 +166,7 @@ class HeldMotions:
     def motions(self, subsets: Set[int]) -> dict[int, Motion]:
         """Motions in which the groups of each subset, as bits, follow the motion and the others the baseline.
 
-        Raises as `reconstruct`.
+        Raises like `reconstruct`.
         """
         expect_work(momenta=len(subsets))
         return {

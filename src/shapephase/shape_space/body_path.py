@@ -42,7 +42,7 @@ def as_path(value: ShapePath | str, body: Body | ParticleBody | None = None, nam
 
 
 def in_joint_order(body: Body | ParticleBody, path: ShapePath | str) -> ShapePath:
-    """Return the path with its columns in the order of the body's joints. Raises as `as_path`, `ShapePath.matched`."""
+    """Return the path with its columns in the body's order of joints. Raises like `as_path`, `ShapePath.matched`."""
     body = as_body_or_particles(body)
     return as_path(path, body).matched(body.joint_names, body.name)
 
@@ -50,7 +50,7 @@ def in_joint_order(body: Body | ParticleBody, path: ShapePath | str) -> ShapePat
 def route_along(body: Body | ParticleBody, path: ShapePath | str) -> ShapePath:
     """Return the path in the order of the body's joints, with breaks where the body's motion is less smooth.
 
-    Raises as `in_joint_order` and `with_crossings`.
+    Raises like `in_joint_order` and `with_crossings`.
     """
     return with_crossings(body, in_joint_order(body, path))
 

@@ -88,7 +88,7 @@ def curvature(body: Body | ParticleBody | str, shape: ArrayLike, *, of: str = "c
     Notes
     -----
     Equation :eq:`curvature` of the documentation; of rates :eq:`ball-curvature`.
-    Raises as `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
+    Raises like `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
 
     Examples
     --------

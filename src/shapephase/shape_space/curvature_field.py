@@ -143,7 +143,7 @@ def stokes_holonomy(
 
     Along a ray lift and integral are found by Gauss collocation of 12 nodes on 1, 2, 4 ... pieces until halving
     changes them by less than a hundredth of the tolerance; a(t) is then sampled and its ordered exponential stepped
-    by the integrator of `holonomy`, whose estimate of the error is what the rest of the tolerance is held against.
+    by the integrator of `holonomy`, whose error estimate has to stay within the rest of the tolerance.
 
     Parameters
     ----------

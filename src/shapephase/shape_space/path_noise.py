@@ -73,7 +73,7 @@ def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = 
     ----------
     path : through samples: `ShapePath.spline`, `ShapePath.waypoints`, or a recorded motion
     t : times (N,) [s]
-    joints : standard deviation of the white noise of the samples, one or one for each joint (n,) [rad or m]; None: the
+    joints : standard deviation of the samples' white noise, one number or one for each joint (n,) [rad or m]; None: the
         one that a recording was smoothed for, or that was estimated where it was low-pass filtered
 
     Raises

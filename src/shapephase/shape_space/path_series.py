@@ -45,7 +45,7 @@ MOST_ROWS = 1_000_000  # of a table made for a path
 def panel_edges(path: ShapePath, loops: int = 1) -> Array:
     """Ends of panels of the first loops, in each of which the path swings once at most: (M,), first 0 [s].
 
-    A path known only as a function has the panels on which its scan resolved it. Raises and warns as `ShapePath.scan`.
+    A path known only as a function has the panels of its scan. Raises and warns like `ShapePath.scan`.
     """
     period = path.duration / path.loops
     own = path.breaks[path.breaks < period * (1.0 - SAME_TIME)]
@@ -95,7 +95,7 @@ def resolved_series(function: Callable[[Array], Array], edges: Array) -> tuple[A
 def joint_extremes(path: ShapePath) -> tuple[Array, Array, Array]:
     """Lowest and highest coordinate and largest rate of each joint over a whole path, to 1e-14: (n,), (n,), (n,).
 
-    Raises and warns as `ShapePath.scan`.
+    Raises and warns like `ShapePath.scan`.
     """
     least = np.full(4 * path.n_shape, -np.inf)
     for values, series in _blocks(path):

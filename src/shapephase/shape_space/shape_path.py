@@ -220,7 +220,7 @@ class ShapePath:
         """Straight moves from rest to rest through waypoints, each by the quintic of least jerk.
 
         r = r_i + (r_(i+1) - r_i) (10 s^3 - 15 s^4 + 6 s^5), s = (t - t_i)/(t_(i+1) - t_i).
-        Parameters and errors as `spline`.
+        Parameters and errors like `spline`.
         """
         t, r, _ = sample_arguments(times, shapes, joint_names)
         return _piecewise(rest_to_rest_curve(t, r), joint_names)

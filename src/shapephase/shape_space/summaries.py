@@ -91,12 +91,12 @@ class PathSummary:
     duration : [s]
     breaks : how many times, ends included, between which it is smooth
     lowest, highest : (n,) of each joint over the whole path, to 1e-14 of its size [rad or m]
-    fastest : (n,) largest rate of each joint, as exactly [rad/s or m/s]
+    fastest : (n,) largest rate of each joint, to the same accuracy [rad/s or m/s]
     fastest_at : (n,) when that is in the first loop, to a twentieth of a panel on which the path swings once [s]
     joints_beyond_limits : names of the joints that leave their limits
     joints_beyond_rates : names of the joints that are faster than the rate limits of the body's file
     still_joints : names of the joints that do not move
-    gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
+    gap : (n,) end minus start, without whole turns of continuous joints [rad or m]
     is_loop : True if it closes
     """
 

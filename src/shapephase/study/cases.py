@@ -58,7 +58,7 @@ class Case:
     Attributes
     ----------
     index : of the case
-    body, motion : recipes
+    body, motion : descriptions from which they are made
     parameters : of the motion's function
     momentum : (3,) [kg m^2/s]
     attitude : (3, 3) at the start; None: the identity

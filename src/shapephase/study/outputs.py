@@ -33,7 +33,7 @@ class Output:
     name : of the array in the store
     function : of the case's `Motion`; another process must find it by its name
     shape : of its result
-    unit : for people
+    unit : in labels of figures and tables
     about : one sentence
 
     Examples

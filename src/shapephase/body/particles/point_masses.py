@@ -37,7 +37,7 @@ class ParticleBody(ShapeArguments):
     joint_units : their units, "rad" or "m"
     joint_limits : (n, 2), infinite where there are none
     continuous : (n,) True where values 2 pi apart are the same shape
-    name : for people
+    name : label in messages and figures
     places : shapes (N, n) -> places (N, m, 3) [m] and their derivatives (N, n, m, 3)
 
     Examples
@@ -215,7 +215,7 @@ def particle_body(
     units : of all, or of each: "rad" or "m"
     continuous : names of those that turn without end, so that values 2 pi apart are the same shape
     limits : name -> least and largest value of a parameter, for plans; others have none
-    name : for people
+    name : label in messages and figures
 
     Raises
     ------

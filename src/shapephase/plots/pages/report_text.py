@@ -107,7 +107,7 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
 
 
 def torque_words(motion: Motion, noise: Array | None = None) -> str:
-    """Sentences about the largest torque and the work, with bars for a recording. Raises as `joint_torques`.
+    """Sentences about the largest torque and the work, with bars for a recording. Raises like `joint_torques`.
 
     noise : of the samples of a recording (n,), where it is known
     """

@@ -71,9 +71,10 @@ class AndoyerVariables:
     0.265000000, 0.265000000
     """
 
-    g: Array
-    k: Array
+    g: Array  #: Angle conjugate to G [rad].
+    k: Array  #: Angle conjugate to K [rad].
     l: Array  # noqa: E741
+    """Angle conjugate to L [rad]."""
     total: Array
     """G, conjugate to g: |mu|."""
     vertical: Array

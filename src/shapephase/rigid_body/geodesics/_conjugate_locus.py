@@ -60,7 +60,7 @@ class ConjugatePoints:
 class ConjugateLocus:
     """Conjugate locus of one order, sampled. Made by `conjugate_locus`."""
 
-    order: int
+    order: int  #: Which conjugate point of each extremal, from 1.
     points: ConjugatePoints
     """In directions (N,), ascending."""
     time_rate: Array
@@ -117,7 +117,7 @@ def conjugate_locus(
     """The conjugate locus of a point: all conjugate points of an order, and its cusps.
 
     A cusp is where the conjugate time is extremal as the direction varies; two of them between neighbouring directions
-    are missed. Raises ShapeError as `conjugate_points`; or for fewer than 8 directions.
+    are missed. Raises ShapeError like `conjugate_points`; or for fewer than 8 directions.
 
     Parameters
     ----------

@@ -54,10 +54,9 @@ class ShortestGeodesic:
     certified: bool
     """Whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut. With a width,
     whether nothing is shorter than `length` by more than this part of it."""
-    lower_bound: float
+    lower_bound: float  #: Distance of an axisymmetric metric below this one [sqrt(kg) m].
     upper_bound: float
-    """`lower_bound` and `upper_bound`: distances of axisymmetric metrics below and above this one, or with a width
-    those of `distance_enclosure` [sqrt(kg) m]."""
+    """Distance of one above it. With a width, both bounds are those of `distance_enclosure` [sqrt(kg) m]."""
     residual: float
     """Angle by which the end misses the attitude [rad]."""
 
@@ -172,7 +171,7 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
     A set may be equivalent attitudes, such as those of a symmetric body, or many samples of a curve of goals.
     Distances of axisymmetric metrics bound those to each from below, so that few of them are searched for.
 
-    Raises ShapeError, AccuracyNotReached as `shortest_geodesic`; if there is no attitude.
+    Raises ShapeError, AccuracyNotReached like `shortest_geodesic`; if there is no attitude.
 
     Parameters
     ----------

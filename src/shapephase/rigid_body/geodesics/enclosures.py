@@ -49,7 +49,7 @@ class GeodesicEnclosure:
     upper: float
     """A geodesic of this length arrives, of a diameter anywhere; or this one is not the shortest after this time."""
     certified: bool
-    """Whether `upper` exceeds `lower` by no more than the width asked for; else the work did not suffice."""
+    """Whether `upper` exceeds `lower` by no more than the requested width; else the work did not suffice."""
     momentum: Array
     """(3,) of the geodesic that arrives at t = 1 with the length `upper`, or of a shorter one to the place where the
     given one is at its upper cut time; the given one's where that is a conjugate point; of a diameter the one to the

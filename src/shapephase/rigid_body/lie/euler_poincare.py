@@ -36,7 +36,7 @@ class EulerPoincareMotion:
     inertia: Array
     """(d, d) inertia operator."""
     times: Array
-    """(N,)."""
+    """Times: (N,)."""
     momentum: Array
     """(..., N, d) body momentum mu."""
     velocity: Array

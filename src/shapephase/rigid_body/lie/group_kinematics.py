@@ -56,7 +56,7 @@ def adjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
 def coadjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
     """Ad*_{g^-1} as a matrix, the left action on covectors, mu_space = Ad*_{g^-1} mu_body: (..., n, n) -> (..., d, d).
 
-    <Ad*_{g^-1} mu, a> = <mu, Ad_{g^-1} a>. Raises LieAlgebraError as `adjoint_action` does.
+    <Ad*_{g^-1} mu, a> = <mu, Ad_{g^-1} a>. Raises LieAlgebraError like `adjoint_action` does.
     Source: Marsden and Ratiu, equation (15.4.5).
 
     Examples
@@ -88,7 +88,7 @@ def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Arr
 def space_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Array:
     """V^S = V g^-1 of a tangent vector at g: (..., n, n), (..., n, n) -> (..., d).
 
-    Raises LieAlgebraError as `body_velocity` does. Source: Marsden and Ratiu, equation (15.4.3).
+    Raises LieAlgebraError like `body_velocity` does. Source: Marsden and Ratiu, equation (15.4.3).
 
     Examples
     --------

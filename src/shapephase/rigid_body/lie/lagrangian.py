@@ -110,7 +110,7 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
 def spatial_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
     """omega = R Omega, hat(omega) = R' R^-1: (..., 3, 3), (..., 3, 3) -> (..., 3) [rad/s, inertial axes].
 
-    Raises ShapeError as `body_angular_velocity`. Source: equation (15.2.7).
+    Raises ShapeError like `body_angular_velocity`. Source: equation (15.2.7).
 
     Examples
     --------

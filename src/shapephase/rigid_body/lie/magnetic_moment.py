@@ -26,7 +26,7 @@ class MagneticEquilibrium:
     """
 
     moment: Array
-    """(..., 3)."""
+    """M, along the field or opposite to it: (..., 3)."""
     energy: Array
     """(...) M . B."""
     spectrum: NDArray[np.complex128]

@@ -123,7 +123,7 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
     """The coefficients of 1, lambda, ... in tr (M + lambda J^2)^k, all constant: (..., n, n) -> (..., k + 1).
 
     Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
-    Raises ShapeError, SingularInertiaError as `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
+    Raises ShapeError, SingularInertiaError like `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
 
     Parameters
     ----------

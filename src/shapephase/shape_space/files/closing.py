@@ -54,7 +54,7 @@ class Closing:
     def holonomy_change(self) -> Array:
         """Rotation vector from the lift's end along the open path to the holonomy of the loop: (3,), base axes [rad].
 
-        Raises AccuracyNotReached as `horizontal_lift`.
+        Raises AccuracyNotReached like `horizontal_lift`.
         """
         ends = [horizontal_lift(self.body, path).end for path in (self.opened, self.closed)]
         return so3.log(so3.transpose(ends[0]) @ ends[1])

@@ -149,7 +149,7 @@ def read_recorded_motion(file: Any, body: Body | str, **options: Unpack[ReadingO
         three angles and of a place have their gaps together; gaps at the start and the end are cut off
     smooth : noise level of the samples, rms, a number [rad or m] or a text as "0.3deg" or "0.3deg,1mm", one for all
         joints or by joint (the others are interpolated); None: the path goes through all samples. See
-        `smoothing.smoothed_path`
+        `smoothed_path`
     smooth_penalty : instead of the penalties that follow from the noise [s^5]
     lowpass : in place of `smooth`, the cut-off [Hz] of a Butterworth filter of second order run forwards and backwards
         over the whole recording, before a stretch or a flight is cut out of it: joints, places and rotations. Both

@@ -119,7 +119,7 @@ def smoothed_path(
     ----------
     times : (N,) ascending; the path starts at 0 [s]
     shapes : (N, n) [rad or m]
-    noise : rms of each sample's noise, one or one for each joint (n,) [rad or m]
+    noise : rms of each sample's noise, one number or one for each joint (n,) [rad or m]
     periodic : None: periodic when the last sample equals the first to 1e-9
     joint_names : n names
     penalty : instead of those that follow from the noise [s^5]; what it does to the motion is known in any case

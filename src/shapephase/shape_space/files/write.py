@@ -105,7 +105,7 @@ def write_shape_path(
 
 
 def _check_rows(path: ShapePath, times: Array) -> None:
-    """Warn where the spline through rows at these times is far from the path. Raises TrajectoryError as `spline`."""
+    """Warn where the spline through rows at these times is far from the path. Raises TrajectoryError like `spline`."""
     off, when = spline_error(path, times)
     worst = int(np.argmax(off))
     if off[worst] > _FAR_OFF:

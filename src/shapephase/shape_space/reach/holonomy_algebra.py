@@ -85,7 +85,7 @@ class Reach:
     rank : of the holonomy algebra: 0, 1 or 3
     singular_values : (3,) of the curvature at and around the shape, carried back to it [rad per square stroke], which
         `rank` counts
-    noise : below which a singular value is taken for zero [the same]
+    noise : below which a singular value is taken for zero [rad per square stroke]
     orders : what is reached at each order of the stroke, up to the first at which `rank` is complete
     loops : for each axis the smallest loop that turns about it, of second or third order
     pairs : of joints, those that turn the body most first

@@ -85,7 +85,7 @@ def reaction_null_space(body: Body | str, shape: ArrayLike) -> Array:
 
     Notes
     -----
-    Raises as `Body.locked_inertia`. Source: Nenchev, Umetani and Yoshida 1992; theory.md A7.
+    Raises like `Body.locked_inertia`. Source: Nenchev, Umetani and Yoshida 1992; theory.md A7.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def dynamic_manipulability(
 
     Notes
     -----
-    Raises as `generalised_jacobian`. Source: Papadopoulos and Dubowsky 1993.
+    Raises like `generalised_jacobian`. Source: Papadopoulos and Dubowsky 1993.
 
     Examples
     --------
