@@ -19,8 +19,6 @@ MARGIN_OF_WIDTH = 1e-3  # of an interval's width: times are not moved farther in
 class PiecewiseChebyshev:
     """A vector-valued function that is a Chebyshev series on each of its panels.
 
-    Attributes
-    ----------
     edges : (m P + 1,) ascending ends of the panels; with m > 1 the P series are repeated m times
     coefficients : (P, n, c) of T_0 ... T_(n-1), padded with zeros to one degree
     """

@@ -32,8 +32,6 @@ _RANK = 1e-10  # share of the largest singular value below which held rates depe
 class PolishedPath:
     """A path corrected to reach the goal as far as possible.
 
-    Attributes
-    ----------
     control : (k, m) control points
     duration : [s]
     path, motion : path of all joints, and its reconstruction
@@ -182,8 +180,6 @@ def _roots(basis: SplineBasis, free: Mask) -> list[tuple[Mask, Array]]:
 class _ActiveSet:
     """Limits of rates, accelerations and jerks that a correction holds as equations.
 
-    Attributes
-    ----------
     bounding : (j, k) rows of all bounded derivatives, by place, from control points of the path
     limits : (j, m)
     active : (j, m) which of them are held

@@ -32,8 +32,6 @@ _RADII = (np.pi, np.pi / 8.0, np.pi / 64.0)  # [strokes] about the start, where 
 class _ReachableTurns:
     """Superset of the attitudes in which a motion can end: exp(angle axis) attitude for any angle, inertial axes.
 
-    Attributes
-    ----------
     attitude : (3, 3)
     link : (3, 3) attitude of the link that is pointed against the base
     axis : (3,) unit vector; None: the angle is 0

@@ -21,8 +21,6 @@ class SplineBasis:
     The functions that `ShapePath.spline(..., periodic=False)` makes of values at the ends of the pieces. A spline lies
     between the least and the largest of its control points, its rate between those of the rate.
 
-    Attributes
-    ----------
     pieces : six or more
     """
 
@@ -98,8 +96,6 @@ class SplineBasis:
     def end_conditions(self, equal: int, *, end_moves: bool, periodic: bool) -> Array:
         """Rows whose products with the control points are zero: (j, k).
 
-        Parameters
-        ----------
         equal : number of equal control points at the end; counts only where the last of them moves
         end_moves : whether the end is free
         periodic : whether the rates at both ends are equal

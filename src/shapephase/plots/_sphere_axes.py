@@ -30,8 +30,6 @@ _LIMB = -1e-9  # [1] height over the limb's plane: rounding on the limb is on th
 class ParallelAxes:
     """Space in parallel projection, on flat axes, or on three-dimensional ones in the view they have.
 
-    Parameters
-    ----------
     ax : flat axes, or three-dimensional ones
     view : elevation and azimuth of the eye [degrees], for flat axes
     """
@@ -115,8 +113,6 @@ class ParallelAxes:
 class SphereAxes(ParallelAxes):
     """The unit sphere in parallel projection; what is on its far side is dimmed.
 
-    Parameters
-    ----------
     ax, view : as for `ParallelAxes`
     """
 

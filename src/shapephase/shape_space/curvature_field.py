@@ -38,6 +38,8 @@ _SHARE = 0.01  # of the tolerance for each ray: the sum over the path then keeps
 def is_flat(body: Body | ParticleBody | str, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
     """True where the curvature vanishes, so that small loops of the joints do not turn the body.
 
+    Source: theory.md B6.
+
     Parameters
     ----------
     shapes : (..., n) to be examined [rad or m]; None: 16 random shapes, always the same, spread over the joint
@@ -50,10 +52,6 @@ def is_flat(body: Body | ParticleBody | str, shapes: ArrayLike | None = None, to
     ------
     ShapeError
         If the last axis is not the body's n joints, there are no shapes, or the tolerance is not above 0.
-
-    Notes
-    -----
-    Source: theory.md B6.
 
     Examples
     --------
@@ -84,6 +82,8 @@ def curvature_on_plane(
 ) -> Array:
     """Curvature F_ij over the plane of two joints.
 
+    Source: theory.md B6; numerics.md section 4.
+
     Parameters
     ----------
     joints : the joints i and j, names or places in the shape vector
@@ -101,10 +101,6 @@ def curvature_on_plane(
         If a name is not one of the body's joints.
     ShapeError
         If the joints are not two different ones, or an array has the wrong shape.
-
-    Notes
-    -----
-    Source: theory.md B6; numerics.md section 4.
 
     Examples
     --------
@@ -145,6 +141,8 @@ def stokes_holonomy(
     changes them by less than a hundredth of the tolerance; a(t) is then sampled and its ordered exponential stepped
     by the integrator of `holonomy`, whose estimate of the error is what the rest of the tolerance is held against.
 
+    Source: theory.md B6, B7.
+
     Parameters
     ----------
     path : a closed path; it may have corners, cross itself and pass through the centre
@@ -164,10 +162,6 @@ def stokes_holonomy(
         If at the centre or at another shape of the cone all mass is on one line: there the connection is not defined.
     AccuracyNotReached
         If the tolerance cannot be met, as where the cone passes close to such a shape.
-
-    Notes
-    -----
-    Source: theory.md B6, B7.
 
     Examples
     --------

@@ -40,8 +40,6 @@ class Layout:
 
     A spline on equal pieces repeats itself where its control points do.
 
-    Attributes
-    ----------
     strokes : of each leg the pieces of a stroke, and how often it is gone round
     """
 
@@ -87,8 +85,6 @@ class StrokeProgram(CollocationProgram):
 
         q_next = q_end q_stroke^rounds.
 
-    Attributes
-    ----------
     places : places of the nodes on the spline
     program, derivatives : as for `CollocationProgram`
     """
