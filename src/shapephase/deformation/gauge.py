@@ -209,17 +209,18 @@ class _HorizontalFrames:
 def principal_gauge(deformation: Deformation) -> Deformation:
     """The deformation seen from its principal axes of inertia: the tensor is diagonal there, and the frame continuous.
 
-    Moments that cross are followed through; where they only come close the axes turn. Moments equal over an interval
-    turn the frame least. At t = 0 the moments ascend, the first two axes point along their largest base components,
-    and the third completes a proper frame. The closure of a loop, U(T) closure U(0)^T, is one of the 24 turns of an
-    octahedron: how the axes have changed places.
+    Moments that cross are followed through; where they only come close the axes turn. Where two are equal over an
+    interval, the frame goes on with the distinct axis and does not turn about it. At t = 0 the moments ascend, the
+    first two axes point along their largest base components, and the third completes a proper frame. The closure of a
+    loop, U(T) closure U(0)^T, is one of the 24 turns of an octahedron: how the axes have changed places.
 
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
 
     Raises
     ------
     GaugeError
-        If the inertia has no continuous frame of principal axes.
+        If the inertia has no continuous frame of principal axes, or moments part after an interval along axes that
+        this frame does not have.
 
     Examples
     --------
