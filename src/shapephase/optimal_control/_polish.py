@@ -8,11 +8,12 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Mask
+from ..chebyshev import gauss_tableau
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._plan_limits import derivative_limits, shortest_duration
-from ._spline_basis import SplineBasis, gauss_tableau
+from ._spline_basis import SplineBasis
 from ._via_points import via_rows
 from .task import Reorientation, motion_along
 

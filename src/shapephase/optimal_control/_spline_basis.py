@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, Mask
+from ..chebyshev import gauss_tableau
 from ..shape_space.shape_path import ShapePath
 
 _DEGREE = 3  # twice differentiable: the acceleration cost is finite, and `ShapePath.spline` reads it back
@@ -130,13 +131,3 @@ class SplineBasis:
         """Return the spline with control points (k, n) as a path of the joints."""
         values = self.matrix(self.nodes) @ control
         return ShapePath.spline(self.nodes * duration, values, periodic=False, joint_names=joint_names)
-
-
-def gauss_tableau(stages: int) -> tuple[Array, Array, Array]:
-    """Gauss nodes and weights on [0, 1], and the integrals from 0 to each node of the polynomials through the nodes."""
-    nodes, weights = np.polynomial.legendre.leggauss(stages)
-    places = 0.5 * (nodes + 1.0)
-    powers = np.arange(stages)
-    values = places[:, None] ** powers
-    integrals = places[:, None] ** (powers + 1) / (powers + 1)
-    return places, 0.5 * weights, np.asarray(np.linalg.solve(values.T, integrals.T).T, dtype=np.float64)

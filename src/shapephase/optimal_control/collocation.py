@@ -10,9 +10,10 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ..chebyshev import gauss_tableau
 from ._plan_limits import Margins
 from ._polish import end_conditions
-from ._spline_basis import SplineBasis, gauss_tableau
+from ._spline_basis import SplineBasis
 from ._via_points import open_points, symbolic_via_rows
 from .nodes.node_distances import DistanceTerms
 from .nodes.node_efforts import EffortTerms

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +14,7 @@ from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
+from ..chebyshev import gauss_tableau
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
@@ -250,7 +250,7 @@ class _Cone:
 
     def _on_pieces(self, pieces: int, times: Array, arms: Array, rates: Array) -> tuple[Array, Array, Array]:
         """a(t), T(1, t), and the magnitude of the terms of a(t), with 12 nodes on each piece of the rays."""
-        nodes, weights, integrals = _collocation()
+        nodes, weights, integrals = gauss_tableau(_NODES)
         along = ((np.arange(pieces)[:, None] + nodes) / pieces).ravel()
         shapes = self._centre + along[:, None] * arms[:, None]
         directions, changes = np.broadcast_arrays(arms[:, None], rates[:, None] * along[:, None])
@@ -294,16 +294,6 @@ def curvature_along(
     bracket = np.cross(turn_first, turn_second)
     norms = np.linalg.norm(np.stack([onward, sideways, bracket]), axis=-1)
     return onward - sideways - bracket, turn_first, norms.sum(axis=0)
-
-
-@lru_cache(maxsize=1)
-def _collocation() -> tuple[Array, Array, Array]:
-    """Gauss nodes and weights of [0, 1], and the integrals from 0 to each node of the polynomials through them."""
-    legendre = np.polynomial.legendre
-    nodes, weights = legendre.leggauss(_NODES)
-    coefficients = (legendre.legvander(nodes, _NODES - 1) * weights[:, None]).T * (np.arange(_NODES)[:, None] + 0.5)
-    integrals = legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T
-    return 0.5 * (nodes + 1.0), 0.5 * weights, np.asarray(0.5 * integrals, dtype=np.float64)
 
 
 def _random_shapes(body: Body | ParticleBody) -> Array:

@@ -11,9 +11,10 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array, Integers
+from ...chebyshev import gauss_tableau
 from ...shape_space.connection import mechanical_connection
 from .._polish import end_conditions
-from .._spline_basis import SplineBasis, gauss_tableau
+from .._spline_basis import SplineBasis
 from ..collocation import STAGES, CollocationProgram, NlpSolution, final_conditions
 from ..cost_metric import METRIC_COSTS
 from ..nodes.node_functions import node_functions
