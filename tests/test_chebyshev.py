@@ -14,6 +14,7 @@ from shapephase.chebyshev import (
     chebyshev,
     derivative_matrix,
     exact_local_coordinate,
+    gauss_tableau,
     inside,
     local_coordinate,
     nodes_on,
@@ -66,6 +67,15 @@ def test_nodes_and_coefficients_against_fifty_digits(degree: int):
     assert np.abs(unit_nodes(degree) - nodes).max() <= EPS
     assert np.abs(values_to_coefficients(degree) - matrix).max() <= 3.0 * EPS / degree
     assert (unit_nodes(degree) == -unit_nodes(degree)[::-1]).all()
+
+
+@pytest.mark.parametrize("count", [1, 2, 8, 16])
+def test_gauss_nodes_integrate_polynomials_from_zero_to_each_node(count: int):
+    nodes, weights, integrals = gauss_tableau(count)
+    powers = np.arange(2 * count)
+    assert weights @ nodes[:, None] ** powers == pytest.approx(1.0 / (powers + 1.0), abs=1e-14)
+    powers = powers[:count]
+    assert integrals @ nodes[:, None] ** powers == pytest.approx(nodes[:, None] ** (powers + 1.0) / (powers + 1.0))
 
 
 def test_values_against_numpy(series):

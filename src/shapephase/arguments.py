@@ -255,10 +255,7 @@ def _symmetric(tensors: Array) -> tuple[Array, float]:
 def moments_argument(moments: ArrayLike) -> Array:
     """Return a user's three positive principal moments: (3,) [kg m^2].
 
-    Raises
-    ------
-    ShapeError
-        If they are not three finite numbers, or the least is not above 1e-12 of the largest.
+    Raises ShapeError if they are not three finite numbers, or the least is not above 1e-12 of the largest.
     """
     values = finite_array(moments, "moments", (3,), unit="kg m^2")
     if values.shape != (3,):

@@ -24,11 +24,8 @@ FARTHEST = 1e6
 def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] = (), *, unit: str = "") -> Array:
     """A float64 array in native byte order whose last axes are `trailing` (None: any length), all finite.
 
-    Raises
-    ------
-    ShapeError
-        For text, objects, complex numbers, masked entries, a wrong shape, NaN or infinity; the message
-        names the argument, the shape that came and the first bad entry.
+    Raises ShapeError for text, objects, complex numbers, masked entries, a wrong shape, NaN or infinity; the message
+    names the argument, the shape that came and the first bad entry.
     """
     array = real_array(value, name, unit)
     last = array.shape[max(0, array.ndim - len(trailing)) :]

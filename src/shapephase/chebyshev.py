@@ -19,8 +19,6 @@ MARGIN_OF_WIDTH = 1e-3  # of an interval's width: times are not moved farther in
 class PiecewiseChebyshev:
     """A vector-valued function that is a Chebyshev series on each of its panels.
 
-    Attributes
-    ----------
     edges : (m P + 1,) ascending ends of the panels; with m > 1 the P series are repeated m times
     coefficients : (P, n, c) of T_0 ... T_(n-1), padded with zeros to one degree
     """
@@ -146,3 +144,13 @@ def restriction_matrix(count: int, left: float, right: float) -> Array:
     """Coefficients of a series on [-1, 1] -> those of the same function on a part of it, as many: (count, count)."""
     nodes = 0.5 * (left + right) + 0.5 * (right - left) * unit_nodes(count - 1)
     return values_to_coefficients(count - 1) @ chebyshev(np.clip(nodes, -1.0, 1.0), count)
+
+
+@lru_cache(maxsize=16)
+def gauss_tableau(count: int) -> tuple[Array, Array, Array]:
+    """Gauss nodes and weights of [0, 1], and the integrals from 0 to each node of the polynomials through them."""
+    legendre = np.polynomial.legendre
+    nodes, weights = legendre.leggauss(count)
+    coefficients = (legendre.legvander(nodes, count - 1) * weights[:, None]).T * (np.arange(count)[:, None] + 0.5)
+    integrals = 0.5 * legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T
+    return 0.5 * (nodes + 1.0), 0.5 * weights, np.asarray(integrals, dtype=np.float64)

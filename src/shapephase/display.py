@@ -31,8 +31,6 @@ _STYLE = (
 class Card:
     """Summary of an object.
 
-    Attributes
-    ----------
     title : what it is, with its name
     rows : names and values with their units
     picture : SVG, or nothing

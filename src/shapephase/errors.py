@@ -395,9 +395,9 @@ class PlanNotFound(ShapePhaseError, ArithmeticError):
 class UnreachableGoalError(PlanNotFound):
     """A goal that no motion of the joints can reach, however long it takes: nothing was searched for.
 
-    Causes: joints whose loops turn the body not at all or about one axis alone, a planar motion, a momentum that turns
-    the body too far or not far enough. Remedy: the message says what can be reached, and the goal nearest to the wanted
-    one; let other joints move, or choose another goal, end or momentum.
+    Causes: joints that are all held, or whose loops turn the body not at all or about one axis alone, a planar motion.
+    Remedy: the message says what can be reached, and the goal nearest to the wanted one; let other joints move, or
+    choose another goal, end or momentum.
 
     Examples
     --------

@@ -81,8 +81,6 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object
 class OutputTarget:
     """Where bytes go.
 
-    Attributes
-    ----------
     path : of the file itself, links followed; of a stream, as given
     is_stream : whether it takes bytes one after the other, and has no contents to replace
     descriptor : 1 for standard output, 2 for standard error, or None

@@ -45,8 +45,6 @@ def least_over(function: Callable[[Array], Array], breaks: Array) -> tuple[float
     Evaluated at up to 65 Chebyshev points of every piece (fewer, but nine at least, where pieces are many); around the
     sixteen lowest of these the search continues to some 1e-9 of the piece. A dip between the points can be missed.
 
-    Parameters
-    ----------
     function : times (N,) -> (N,)
     breaks : (M,) ascending [s]
     """

@@ -25,18 +25,14 @@ def safe_newton(
 ) -> Array:
     """The x (N,) in [low, high] where increasing functions cross 0.
 
-    Parameters
-    ----------
+    Raises AccuracyNotReached if the bracket has not closed after 120 steps, which a function that is not a number
+    causes.
+
     step : x (N,) -> the functions there, or anything of their sign, and the next x by the caller's rule
     start, low, high : (N,)
     floor : change of x that makes no difference, however small x is; 6e-16 of x is always such
 
     A next x outside the bracket is replaced by the bracket's middle, so that it ends whatever the rule.
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the bracket has not closed after 120 steps, which a function that is not a number causes.
     """
     x, low, high = np.clip(start, low, high), low.copy(), high.copy()
     last = high - low

@@ -78,10 +78,7 @@ def watched(progress: ProgressCallback | None, stretch: float = _STRETCH) -> Ite
 
     stretch : share of the phase still left that one stretch takes
 
-    Raises
-    ------
-    RunStopped
-        If the callback returned something true.
+    Raises RunStopped if the callback returned something true.
     """
     check_progress(progress)
     if progress is None:

@@ -142,7 +142,6 @@ ARMS = {"right_shoulder_abduction": ("left_shoulder_abduction", 1.0)}
 # The wheel's share of the inertia about its axis.
 WHEEL = 0.5 / 4.5
 
-# Two equal halves turn against each other by half of what their waist turns, half a turn at most.
 IMPOSSIBLE = [
     Case("rotor", turn(Z, 0.4), "rank 0", 0.4),
     Case("rotor", turn(X, 0.4), "rank 0", 0.4),
@@ -172,7 +171,6 @@ IMPOSSIBLE = [
     Case("stiff", turn(X, 0.5), "both of their limits are the same", 0.5),
     Case("cat_untwisted", turn(Y, 1.0), r"one axis alone, \[1, 0, 0\]", 1.0),
     Case("cat_untwisted", SKEW, "one axis alone", beyond(SKEW, X)),
-    Case("cat_two_halves", turn(X, 2.0), "where it ends", 2.0 - np.pi / 2, {"joints": ["waist_roll"], "end": "free"}),
     Case("diver", turn(Y, 0.3), "with one freedom", 0.3, {"symmetric": ARMS}),
     Case("satellite", turn(X, 0.3), "wheel_spin", 0.3, {"joints": ["wheel_spin"]}),
     Case("cat", turn(X, 3.0), "tail_3_yaw", 3.0, {"joints": ["tail_3_yaw"]}),
@@ -191,42 +189,16 @@ def test_what_no_motion_reaches_is_refused_with_its_reason(case, body_of):
     assert re.search("--joints|choose another goal|--to free", str(refused.value))
 
 
-def momentum_of_one_hinge():
-    """Least and largest inertia about z of two bars with one hinge, by hand [kg m^2]."""
-    # Centres 0.5 m apart when straight, at one place when folded; the reduced mass is 0.5 kg.
-    return 0.04, 0.04 + 0.5 * 0.5**2
-
-
-@pytest.mark.parametrize(
-    ("goal", "cost", "miss"),
-    [
-        (turn(Z, 0.1), "kinetic", 0.02 / momentum_of_one_hinge()[1] - 0.1),
-        (turn(Z, 1.0), "kinetic", 1.0 - 0.02 / momentum_of_one_hinge()[0]),
-        (turn(Z, 1.0), "time", 1.0 - 0.02 / momentum_of_one_hinge()[0]),
-        (Goal(somersaults=1, twist_axis=X), "kinetic", 2 * np.pi - 0.02 / momentum_of_one_hinge()[0]),
-    ],
-)
 @pytest.mark.usefixtures("no_search")
-def test_a_momentum_that_turns_a_hinge_too_far_or_not_far_enough(goal, cost, miss, load_urdf):
-    body, limits = load_urdf(chain(2)), Limits(rate_limits=3.0)
-    with pytest.raises(UnreachableGoalError, match="hinge_1") as refused:
-        plan_reorientation(body, goal, momentum=[0.0, 0.0, 0.02], cost=cost, limits=limits)
-    missed = re.search(r"missed by ([\d.e-]+) degrees", str(refused.value))
-    assert missed is not None
-    assert np.radians(float(missed[1])) == pytest.approx(miss, rel=2e-3)
-
-
-@pytest.mark.parametrize(("goal", "miss"), [(turn(Z, 1.5), 0.5), (Goal(somersaults=1, twist_axis=X), 2 * np.pi - 1.0)])
-@pytest.mark.usefixtures("no_search")
-def test_a_body_whose_joints_are_locked_spins_as_its_momentum_has_it(goal, miss, load_urdf):
+def test_a_body_whose_joints_are_locked_spins_as_its_momentum_has_it(load_urdf):
     """By 1 rad in 1 s: 4.5 kg m^2 and as many kg m^2/s about z."""
     body = load_urdf(wheels(Z).replace('type="continuous"', 'type="revolute"').replace(
         "</joint>", '<limit lower="0" upper="0" effort="1" velocity="1"/></joint>'))  # fmt: skip
     with pytest.raises(UnreachableGoalError, match="body") as refused:
-        plan_reorientation(body, goal, momentum=[0.0, 0.0, 4.5], duration=1.0)
+        plan_reorientation(body, turn(Z, 1.5), momentum=[0.0, 0.0, 4.5], duration=1.0)
     missed = re.search(r"missed by ([\d.e-]+) degrees", str(refused.value))
     assert missed is not None
-    assert np.radians(float(missed[1])) == pytest.approx(miss, rel=1e-3)
+    assert np.radians(float(missed[1])) == pytest.approx(0.5, rel=1e-3)
 
 
 REACHABLE = {

@@ -17,7 +17,7 @@ from typing import Any
 from support.asked_process import Answers, AskedProcess, ProcessEnded, requests
 from support.damaged_files import mutated
 from support.reference_load import Effort, TooMuchWork
-from support.warm_engines import WarmEngine, WarmStart
+from support.warm_engines import WarmStart
 
 HANG_SECONDS = 120
 """A process that has not answered in this time never will [s]; nothing is concluded from times below."""
@@ -129,10 +129,11 @@ def work(memory: int) -> None:
     import shapephase.cli.motion
     import shapephase.cli.texts.result_text  # noqa: F401
     from shapephase.body.engines import engine_tree
+    from shapephase.body.engines.formats import MJCF
     from shapephase.shape_space.files.formats import parser_process
 
     # MuJoCo and what else reads in a process of its own has limits of its own, in processes that start without these.
-    engine_tree.run_alone = WarmEngine()
+    engine_tree.run_alone = WarmStart(MJCF)
     parser_process.run_alone = WarmStart()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))

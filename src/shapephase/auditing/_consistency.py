@@ -69,8 +69,6 @@ def rate_agreement(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> Ra
 class RateDifferences:
     """Rates of the samples less those given.
 
-    Attributes
-    ----------
     times : (M,) [s]
     difference : (M, k) of base and joints
     level : (M, k) its noise

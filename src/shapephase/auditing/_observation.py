@@ -28,8 +28,6 @@ REACH = 4  # neighbours on each side, which the samples at both ends do not have
 class Observation:
     """One stretch of a trajectory of N samples, as one body has it.
 
-    Attributes
-    ----------
     mass : of the body [kg]
     trajectory : with rates, given or found
     given_rates : whether they were given

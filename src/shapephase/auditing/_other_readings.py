@@ -88,8 +88,6 @@ def other_readings(
 ) -> list[OtherReading]:
     """All of them, each applied to all runs.
 
-    Parameters
-    ----------
     levels : noise of each run as it is
     any_step : whether the drift of an integrator's step of any length is taken off
     """

@@ -31,8 +31,6 @@ _TURN = 0.01
 class Residuals:
     """Residuals of one run, whitened.
 
-    Attributes
-    ----------
     seen : what they are of
     rates : given rates less those of the configurations, or None
     step : what a step of one second of semi-implicit Euler would add
@@ -206,8 +204,6 @@ def step_drift(body: Body, seen: Observation, slope: Array | None) -> StepDrift:
     integral of (c2 - integral of c3 dt) / 2, and the rates given are those of h / 2 earlier. Rates that are differences
     of the samples are later by h / 2, which takes G / 2 off.
 
-    Parameters
-    ----------
     slope : (M, c) derivatives of the given rates, or None
     """
     fastest = max(float(np.abs(seen.rate).max()), float(np.abs(seen.joint_rates).max(initial=0.0)), 1e-300)

@@ -35,17 +35,12 @@ def short_run_audit(
 ) -> RunAudit:
     """Momentum, its drift and the fall of a flight of few samples, with their standard deviations.
 
-    Parameters
-    ----------
+    Raises AccuracyNotReached if no flight of this body is near.
+
     run : the samples in the air
     tolerance : of the momentum relative to what turns the body
     wander : of the centre of mass [m], which widens that tolerance
     noise : of the samples; None: what they show
-
-    Raises
-    ------
-    AccuracyNotReached
-        If no flight of this body is near.
     """
     times = run.times - run.times[0]
     path = ShapePath.spline(times, run.shapes, periodic=False, joint_names=body.joint_names)

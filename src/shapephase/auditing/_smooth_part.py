@@ -38,8 +38,6 @@ _UNLIKE = 2.0  # mean deviance in units of that of noise; 1.3 is exceeded by cha
 class SmoothPart:
     """What the first polynomials take of residuals.
 
-    Attributes
-    ----------
     values : (N, k) that they sum up to
     ratio : its square in units of what noise alone brings, over the limit: above 1, noise does not explain it
     noise : what noise alone brings to the values, rms
@@ -71,8 +69,6 @@ def smooth_part(
 ) -> SmoothPart:
     """The smooth part of residuals (N, k) whose noise has covariances (N, k, k).
 
-    Parameters
-    ----------
     free : how many of the lowest polynomials a body that nothing acts on may have
     carried : instead of the covariances: what each of m unit noises of a sample adds to its residual, (N, k, m), and
         to all that come after it, (N, k, m)
@@ -128,8 +124,6 @@ def noise_spectrum(whitened: Array, slow: int) -> Array:
     white noise; noise with memory, x' = a x + white, whose highest frequencies are those of the differences of samples;
     and white noise below a cut-off, if the powers there scatter as those of noise do.
 
-    Parameters
-    ----------
     whitened : (N, c) residuals in units of white noise
     slow : orders of cosines that may be no noise
     """

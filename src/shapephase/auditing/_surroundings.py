@@ -184,8 +184,6 @@ def wrong_gravity(
 ) -> Hypothesis | None:
     """None where every fall is that on earth with x, y or z up, of a recording also down, or none, as in orbit.
 
-    Parameters
-    ----------
     runs : results of the same trajectories
     wander : of the centre of mass of those that are recordings [m]
     steps : of semi-implicit Euler, whose drift of the centre of mass is taken off [s]

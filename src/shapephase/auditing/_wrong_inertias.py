@@ -53,8 +53,6 @@ class _Direction:
 class _Part:
     """Links that nothing moves against each other.
 
-    Attributes
-    ----------
     frame : the first that has mass
     links : name and frame of each
     """

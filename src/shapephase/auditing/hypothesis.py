@@ -26,8 +26,6 @@ EXPLAINS = 0.2  # of the rms without any hypothesis: more is not explained
 class Leftover:
     """Residuals of the three laws: momentum, fall, rates.
 
-    Attributes
-    ----------
     squares : (3,) their sums of squares
     counts : (3,) independent numbers
     effective : (3,) those of them that the spectrum of the residuals leaves independent: nu = 3 (sum c^2)^2 / sum c^4
@@ -144,8 +142,6 @@ def _shown(found: FittedValue) -> str:
 class Ranking:
     """Hypotheses by evidence.
 
-    Attributes
-    ----------
     ranked : all, the best first
     tie : the first and all that the samples cannot separate from it; empty where nothing explains what is wrong
     """
@@ -170,8 +166,6 @@ class Evidence:
     x up to x = 1 and nu (1 + log x) beyond. The Bayesian information criterion (Schwarz 1978) adds log(sum of nu)
     for each fitted number.
 
-    Attributes
-    ----------
     without : residuals without any hypothesis
     allowed : (3,) share of these squares that is within the tolerance; 1 or more where that law holds
     colour : (3,) mean square of the noise of the samples, in units of white noise with its highest frequencies

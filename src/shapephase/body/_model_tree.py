@@ -160,17 +160,12 @@ def _carved_wheel(mass: float, tensor: Array, axle: Array, inertia: float, link:
 
     A flat disc, J a a^T + J/2 (1 - a a^T), whose radius of gyration is that of the link, so that its mass is less.
 
-    Parameters
-    ----------
+    Raises ShapeError if no distribution of mass has what is left: its integral of r r^T dm would not be positive.
+
     mass, tensor : of the link with the wheel in it [kg], (3, 3) [kg m^2]
     axle : (3,) unit vector a
     inertia : J [kg m^2]
     link : its name, for messages
-
-    Raises
-    ------
-    ShapeError
-        If no distribution of mass has what is left: its integral of r r^T dm would not be positive.
     """
     moment = second_moment(tensor)
     frame = so3.between(np.array([0.0, 0.0, 1.0]), axle)

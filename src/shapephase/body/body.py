@@ -422,6 +422,8 @@ class Body(ShapeArguments):
     def locked_inertia(self, shape: ArrayLike) -> Array:
         """Inertia of the body frozen in a shape, about its centre of mass, base axes.
 
+        Source: Cabrera 2006, section 2.3; theory.md A3.
+
         Parameters
         ----------
         shape : (..., n) [rad or m]
@@ -434,16 +436,15 @@ class Body(ShapeArguments):
         ------
         ShapeError
             If the last axis is not the body's n joints, or an entry is not finite.
-
-        Notes
-        -----
-        Source: Cabrera 2006, section 2.3; theory.md A3.
         """
         r = self._checked(shape)
         return angular_map(*self._maps(), self._rows(r))[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
     def momentum_matrix(self, shape: ArrayLike) -> Array:
         """J(r), the angular momentum per unit joint rate with the base at rest: L_o = J(r) rate.
+
+        Raises like `locked_inertia`. Equation :eq:`internal-momentum` of the documentation.
+        Source: theory.md A7.
 
         Parameters
         ----------
@@ -452,11 +453,6 @@ class Body(ShapeArguments):
         Returns
         -------
         (..., 3, n) about the centre of mass, base axes [kg m^2/s per unit of joint rate]
-
-        Notes
-        -----
-        Raises like `locked_inertia`. Equation :eq:`internal-momentum` of the documentation.
-        Source: theory.md A7.
         """
         r = self._checked(shape)
         return angular_map(*self._maps(), self._rows(r))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)
@@ -478,6 +474,9 @@ class Body(ShapeArguments):
     def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
         """Derivative of the angular momentum I w + J rate by each joint while w and the rates stay the same, exact.
 
+        One call of Pinocchio for all joints (its derivatives of the centroidal momentum), where `inertia_gradient`
+        and `momentum_matrix_gradient` take one for each.
+
         Parameters
         ----------
         shape, rate : (..., n) [rad or m], [rad/s or m/s]
@@ -486,11 +485,6 @@ class Body(ShapeArguments):
         Returns
         -------
         (..., n, 3) dI/dr_k w + dJ/dr_k rate, base axes [kg m^2/s per unit of joint]
-
-        Notes
-        -----
-        One call of Pinocchio for all joints (its derivatives of the centroidal momentum), where `inertia_gradient`
-        and `momentum_matrix_gradient` take one for each.
         """
         r, v, w = self._with_base_rate(shape, rate, base_rate)
         gradients = momentum_gradients(*self._maps(), self._rows(r), self._rows(v), w.reshape(-1, 3))
@@ -568,14 +562,12 @@ class Body(ShapeArguments):
     def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """Kinetic energy of a joint motion and a turn of the base, about the centre of mass: -> (...) [J].
 
+        Source: Cabrera 2006, equation (4); theory.md A6 (with the factor one half that C-E1 restores).
+
         Parameters
         ----------
         shape, rate : (..., n) [rad or m], [rad/s or m/s]
         angular_velocity : (..., 3) of the base, base axes [rad/s]; at rest it is T_0
-
-        Notes
-        -----
-        Source: Cabrera 2006, equation (4); theory.md A6 (with the factor one half that C-E1 restores).
         """
         r, v, omega = self._turning(shape, rate, angular_velocity)
         rows = self._rows(r), self._rows(v), omega.reshape(-1, 3)

@@ -40,6 +40,8 @@ class ShapeArguments:
     def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
         """Angular momentum of a change of shape about the centre of mass with the base at rest.
 
+        Raises like `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
+
         Parameters
         ----------
         shape, rate : (..., n) [rad or m], [rad/s or m/s]; leading axes broadcast
@@ -47,10 +49,6 @@ class ShapeArguments:
         Returns
         -------
         (..., 3) base axes [kg m^2/s]
-
-        Notes
-        -----
-        Raises like `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
         """
         r, v = self._checked(shape), self._checked(rate, "rate")
         common_batch(shape=r.shape[:-1], rate=v.shape[:-1])

@@ -161,8 +161,6 @@ def enclosure(
     Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
     Raises AccuracyNotReached if the deformation is too rough between its breaks to be sampled.
 
-    Parameters
-    ----------
     interval : (start, end) [s]; None: [0, duration]
     magnitude : of the momenta for which the deformation is sampled to `tolerance` [kg m^2/s]
     tolerance : as for `reconstruct` [rad]

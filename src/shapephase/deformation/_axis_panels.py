@@ -42,8 +42,6 @@ TO_SERIES = AT_NODES.T * (2.0 / _NODES) * np.where(np.arange(COUNT) > 0, 1.0, 0.
 class AxisPanels:
     """Frames on panels, each up to a turn from the left.
 
-    Attributes
-    ----------
     left, right : (P,) ends [s]
     series : (P, n, 4) quaternions xyzw as Chebyshev series
     kind : (P,) whether moments are separate, two equal (the distinct axis is then the third), or all equal

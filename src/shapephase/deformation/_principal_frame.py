@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,20 +19,16 @@ from ..arrays import Array
 from ..chebyshev import PiecewiseChebyshev, exact_local_coordinate
 from ..errors import GaugeError
 from ._axis_panels import (
-    AT_NODES,
     EQUAL,
     NEARLY_DIAGONAL,
     NO_TURN,
-    PANEL_NODES,
     POINTS_BETWEEN,
     SEPARATE,
     SPHERICAL,
     SYMMETRIC,
     THIRD,
-    TO_SERIES,
     AxisPanels,
     cube_turns,
-    halves,
     in_order,
     inertia_in,
     is_diagonal_at,
@@ -46,7 +41,6 @@ from .deformation import Deformation
 Frames = Callable[[Array], tuple[Array, Array]]
 
 _PANELS_OF_A_LOOP = 4  # at first, at least: each is halved until its polynomials fit
-_INTERVAL = 1e-4  # of a loop: moments that are equal for less meet at an instant
 _AT_JOINTS = 1e-11  # of the trace, for entries off the diagonal where panels meet: their polynomials are worst there
 _SLOPPY = 1e-7  # of the trace: a smaller jump of the inertia is inexact data, like a loop read from a file
 _JUMP = 0.1  # [rad] between neighbouring panels: farther apart the axes jump
@@ -58,8 +52,7 @@ def principal_frames(deformation: Deformation) -> Frames:
 
     U I U^T is diagonal to 1e-11 of its trace, to some 2e-14 where nothing is sudden; hat(rate) = U^T U'.
     U is continuous wherever the inertia has a continuous frame of principal axes. Where moments are equal over an
-    interval the frame turns least: with the distinct axis, and about it only if separate moments before and after the
-    interval ask for it, then uniformly.
+    interval the frame goes on with the distinct axis and does not turn about it.
 
     At t = 0 one of the 24 frames is chosen: moments ascend (moments that meet there as just after they part), the first
     two axes each point along their largest base component, the third completes a proper frame. If two moments are
@@ -69,9 +62,9 @@ def principal_frames(deformation: Deformation) -> Frames:
     Raises GaugeError if the axes jump where moments meet, or turn by more than 2e8 rad per loop.
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
     """
-    panels, freedom = _joined(deformation)
-    panels = replace(panels, series=so3.quat_product(_settled(panels, freedom), panels.series))
-    panels = replace(panels, series=so3.quat_product(_labels_at_start(deformation, panels, freedom), panels.series))
+    panels = _joined(deformation)
+    panels = replace(panels, series=so3.quat_product(_settled(panels), panels.series))
+    panels = replace(panels, series=so3.quat_product(_labels_at_start(deformation, panels), panels.series))
     return _track(panels)
 
 
@@ -96,19 +89,10 @@ def _track(panels: AxisPanels) -> _Track:
     return _Track(PiecewiseChebyshev(panels.edges, both))
 
 
-def _joined(deformation: Deformation) -> tuple[AxisPanels, _Freedom]:
-    """Continuous panels over the whole motion, and what equal moments leave open for all time. Raises GaugeError."""
-    panels = _over_loops(deformation)
-    shortest = _INTERVAL * deformation.duration / deformation.loops
-    while True:
-        oriented, freedom = _oriented(panels, shortest)
-        continuous, jumps = _continuous(deformation, oriented)
-        # Wide panels may hide between them an interval of equal moments, in which the axes can turn.
-        hiding = (np.append(jumps, 0.0) + np.append(0.0, jumps) > 0.0) & (panels.right - panels.left > shortest)
-        if not hiding.any():
-            break
-        split = panels.kept(hiding)
-        panels = in_order([panels.kept(~hiding), resolved(deformation, *halves(split.left, split.right))])
+def _joined(deformation: Deformation) -> AxisPanels:
+    """Continuous panels over the whole motion. Raises GaugeError."""
+    panels = _oriented(_over_loops(deformation))
+    continuous, jumps = _continuous(deformation, panels)
     if jumps.any():
         joint = int(np.argmax(jumps))
         where = panels.left[joint + 1]
@@ -117,7 +101,7 @@ def _joined(deformation: Deformation) -> tuple[AxisPanels, _Freedom]:
             f"{moments_at(deformation, where)}: no frame of principal axes is continuous there; use the "
             "horizontal gauge"
         )
-    return continuous, freedom
+    return continuous
 
 
 def _over_loops(deformation: Deformation) -> AxisPanels:
@@ -145,123 +129,32 @@ def _over_loops(deformation: Deformation) -> AxisPanels:
 # ---- From panel to panel --------------------------------------------------------------------------------------------
 
 
-class _Freedom(NamedTuple):
-    """Turns from the left that the whole frame may still make: all, those about an axis, or none."""
-
-    kind: int
-    axis: Array
-
-
-class _EqualMoments(NamedTuple):
-    """Panels `first` to `last` where moments are equal, all of one kind and one distinct axis."""
-
-    first: int
-    last: int
-    kind: int
-    axis: Array
-
-
-class _Orientation:
-    """The turn from the left of every panel, and the spins where moments are equal, found panel by panel."""
-
-    def __init__(self, panels: AxisPanels, shortest: float) -> None:
-        self._panels, self._shortest = panels, shortest
-        self.turns = np.tile(NO_TURN, (len(panels.left), 1))
-        self.spins: list[tuple[_EqualMoments, Array]] = []
-        self.freedom = _Freedom(int(panels.kind[0]), THIRD)
-        self._intervals: list[_EqualMoments] = []
-        self._first, self._last = (so3.normalised(end) for end in _ends(panels.series))
-
-    def run(self) -> None:
-        kinds = self._panels.kind.tolist()
-        group, table = cube_turns()
-        steps = nearest_cube_turn(so3.quat_product(self._last[:-1], so3.quat_inverse(self._first[1:]))).tolist()
-        labels = table.tolist()
-        self._enter(0, kinds[0])
-        label = 0
-        for panel in range(1, len(kinds)):
-            if kinds[panel - 1] == kinds[panel] == SEPARATE:
-                label = labels[label][steps[panel - 1]]
-                self.turns[panel] = group[label]
-                continue
-            ideal = so3.quat_product(
-                so3.quat_product(self.turns[panel - 1], self._last[panel - 1]), so3.quat_inverse(self._first[panel])
-            )
-            if kinds[panel] == SEPARATE:
-                label = int(nearest_cube_turn(ideal))
-                self.turns[panel] = group[label]
-            elif kinds[panel] == SYMMETRIC:
-                # The distinct axis becomes one of the frame's.
-                seen = so3.matrix_from_quat(ideal) @ THIRD
-                axis = np.sign(seen) * (np.arange(3) == np.argmax(np.abs(seen)))
-                self.turns[panel] = so3.quat_product(so3.quat_from_matrix(so3.between(seen, axis)), ideal)
-            else:
-                self.turns[panel] = ideal
-            self._absorb(so3.quat_product(self.turns[panel], so3.quat_inverse(ideal)), panel)
-            self._enter(panel, kinds[panel])
-
-    def _wide(self, interval: _EqualMoments) -> bool:
-        return self._panels.right[interval.last] - self._panels.left[interval.first] >= self._shortest
-
-    def _absorb(self, excess: Array, panel: int) -> None:
-        """Turn the frames before this panel by the missing turn, where equal moments leave it open."""
-        part = _part(excess, self.freedom.kind, self.freedom.axis)
-        if part is not None:
-            self.turns[:panel] = so3.quat_product(part, self.turns[:panel])
-            self.spins = [(interval, so3.matrix_from_quat(part) @ spin) for interval, spin in self.spins]
-            excess = so3.quat_product(excess, so3.quat_inverse(part))
-        for interval in reversed(self._intervals):
-            part = _part(excess, interval.kind, interval.axis)
-            if part is not None and self._wide(interval):
-                self.spins.append((interval, so3.rotation_vector_from_quat(part)))
-                after = slice(interval.last + 1, panel)
-                self.turns[after] = so3.quat_product(part, self.turns[after])
-                return
-            if interval.kind == SYMMETRIC:
-                return
-
-    def _enter(self, panel: int, kind: int) -> None:
-        if kind == SEPARATE:
-            self._intervals, self.freedom = [], _Freedom(SEPARATE, THIRD)
-            return
-        axis = np.round(so3.matrix_from_quat(self.turns[panel]) @ THIRD)
-        first = panel
-        if self._intervals:
-            before = self._intervals[-1]
-            if before.kind == kind and abs(before.axis @ axis) > 0.5:
-                first, axis = self._intervals.pop().first, before.axis
-        self._intervals.append(_EqualMoments(first, panel, kind, axis))
-        if kind == SYMMETRIC:
-            if self.freedom.kind == SPHERICAL:
-                self.freedom = _Freedom(SYMMETRIC, axis)
-            elif abs(self.freedom.axis @ axis) < 0.5:
-                self.freedom = _Freedom(SEPARATE, THIRD)
-
-
-def _part(turn: Array, kind: int, axis: Array) -> Array | None:
-    """The part (4,) of a turn that frames of a kind may make; None where it is rounding."""
-    if kind == SYMMETRIC:
-        turn = so3.quat_from_rotation_vector(2.0 * np.arctan2(turn[:3] @ axis, turn[3]) * axis)
-    return None if kind == SEPARATE or np.linalg.norm(turn[:3]) < 1e-9 else turn
-
-
-def _oriented(panels: AxisPanels, shortest: float) -> tuple[AxisPanels, _Freedom]:
-    """The panels turned from the left, where they may be, so that each continues where the one before ends.
-
-    Moments that are equal for less than `shortest` [s] meet at an instant, in which the frame cannot turn.
-    """
-    orientation = _Orientation(panels, shortest)
-    orientation.run()
-    series = so3.quat_product(orientation.turns[:, None], panels.series)
-    for interval, turn in orientation.spins:
-        rows = slice(interval.first, interval.last + 1)
-        left, right = panels.left[rows, None], panels.right[rows, None]
-        times = 0.5 * (left + right) + 0.5 * (right - left) * PANEL_NODES
-        part = (times - left[0]) / (right[-1] - left[0])
-        spin = so3.quat_from_rotation_vector(part[..., None] * turn)
-        series[rows] = TO_SERIES @ so3.quat_product(spin, AT_NODES @ series[rows])
-    strength = so3.apply(so3.matrix_from_quat(orientation.turns) ** 2, panels.strength)
-    return replace(panels, series=series, strength=strength), orientation.freedom
+def _oriented(panels: AxisPanels) -> AxisPanels:
+    """The panels turned from the left, where they may be, so that each continues where the one before ends."""
+    kinds = panels.kind.tolist()
+    turns = np.tile(NO_TURN, (len(kinds), 1))
+    first, last = (so3.normalised(end) for end in _ends(panels.series))
+    group, table = cube_turns()
+    steps = nearest_cube_turn(so3.quat_product(last[:-1], so3.quat_inverse(first[1:]))).tolist()
+    label = 0
+    for panel in range(1, len(kinds)):
+        if kinds[panel - 1] == kinds[panel] == SEPARATE:
+            label = int(table[label, steps[panel - 1]])
+            turns[panel] = group[label]
+            continue
+        ideal = so3.quat_product(so3.quat_product(turns[panel - 1], last[panel - 1]), so3.quat_inverse(first[panel]))
+        if kinds[panel] == SEPARATE:
+            label = int(nearest_cube_turn(ideal))
+            turns[panel] = group[label]
+        elif kinds[panel] == SYMMETRIC:
+            # The distinct axis becomes one of the frame's.
+            seen = so3.matrix_from_quat(ideal) @ THIRD
+            axis = np.sign(seen) * (np.arange(3) == np.argmax(np.abs(seen)))
+            turns[panel] = so3.quat_product(so3.quat_from_matrix(so3.between(seen, axis)), ideal)
+        else:
+            turns[panel] = ideal
+    strength = so3.apply(so3.matrix_from_quat(turns) ** 2, panels.strength)
+    return replace(panels, series=so3.quat_product(turns[:, None], panels.series), strength=strength)
 
 
 def _ends(series: Array) -> tuple[Array, Array]:
@@ -310,25 +203,24 @@ def _continuous(deformation: Deformation, panels: AxisPanels) -> tuple[AxisPanel
 # ---- The choice at the start ----------------------------------------------------------------------------------------
 
 
-def _settled(panels: AxisPanels, freedom: _Freedom) -> Array:
-    """The turn from the left that uses up what equal moments leave open for all time: (4,)."""
+def _settled(panels: AxisPanels) -> Array:
+    """The turn from the left that uses up what moments that are equal for all time leave open: (4,)."""
     start = so3.normalised(_ends(panels.series[:1])[0])[0]
-    if freedom.kind == SPHERICAL:
+    if (panels.kind == SPHERICAL).all():
         return so3.quat_inverse(start)
-    if freedom.kind == SEPARATE:
+    # Moments differ where the axes' turns are known: about the distinct axis alone they are not.
+    if (panels.kind != SYMMETRIC).any() or (panels.strength[:, 2] > panels.strength[:, :2].max(axis=1)).any():
         return NO_TURN
     axes = so3.matrix_from_quat(start)
-    distinct = freedom.axis @ axes
+    distinct = axes[2]
     farthest = np.eye(3)[np.argmin(np.round(np.abs(distinct), 9))]
     seen = axes @ (farthest - (farthest @ distinct) * distinct)
-    target = np.roll(np.abs(freedom.axis), 1)
-    angle = np.arctan2(np.cross(seen, target) @ freedom.axis, seen @ target)
-    return so3.quat_from_rotation_vector(angle * freedom.axis)
+    return so3.quat_from_rotation_vector(np.arctan2(seen[1], seen[0]) * -THIRD)
 
 
-def _labels_at_start(deformation: Deformation, panels: AxisPanels, freedom: _Freedom) -> Array:
+def _labels_at_start(deformation: Deformation, panels: AxisPanels) -> Array:
     """The one of the 24 turns from the left that names the axes at t = 0 by the rule of `principal_frames`: (4,)."""
-    if freedom.kind == SPHERICAL:
+    if (panels.kind == SPHERICAL).all():
         return NO_TURN
     times = np.append(0.0, deformation.duration * 2.0 ** np.arange(-45.0, 0.5))
     frames, _ = _track(panels)(times)

@@ -45,8 +45,6 @@ _LEAST_ARM = 0.1  # of the distance at which a part alone would make the body's 
 class AssemblyDescription(UngaugedDescription):
     """The sum of parts, seen from the frame they are described in.
 
-    Attributes
-    ----------
     parts : each with its moments
     origin : (3,) a point near the common centre of mass; sums are taken about it, which saves digits
     breaks : (M,) that were declared [s]
@@ -153,6 +151,8 @@ def rigid_part(
 ) -> RigidPart:
     """A rigid part of an assembly: the spacecraft, or a mass bolted to it.
 
+    Since masses add up to masses, an assembly of parts that are physical is physical at all times.
+
     Parameters
     ----------
     mass : [kg]
@@ -164,10 +164,6 @@ def rigid_part(
     ------
     ShapeError, UnphysicalInertiaError
         For a mass that is not positive, a wrong shape, or an inertia that no distribution of mass has.
-
-    Notes
-    -----
-    Since masses add up to masses, an assembly of parts that are physical is physical at all times.
 
     Examples
     --------
@@ -191,6 +187,8 @@ def rigid_part(
 def moving_mass(mass: float, path: ShapePath | str) -> MovingMass:
     """A point mass of an assembly that moves in its frame: someone moving the furniture.
 
+    Source: Cabrera 2006, example 2.2.
+
     Parameters
     ----------
     mass : [kg]
@@ -200,10 +198,6 @@ def moving_mass(mass: float, path: ShapePath | str) -> MovingMass:
     ------
     TrajectoryError
         If the path has not three columns, or the mass is not positive.
-
-    Notes
-    -----
-    Source: Cabrera 2006, example 2.2.
 
     Examples
     --------
@@ -263,6 +257,8 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     The common centre of mass moves in that frame, and there is internal momentum; inertia, momentum, rates and energy
     are exact sums over the parts.
 
+    Source: Cabrera 2006, examples 2.2 and 4.5; theory.md F6.
+
     Parameters
     ----------
     spacecraft : by `rigid_part`; its frame is the base frame
@@ -277,10 +273,6 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
         If all mass is on one line at some time, which the message names.
     WrongObjectError
         If a part is not by these functions.
-
-    Notes
-    -----
-    Source: Cabrera 2006, examples 2.2 and 4.5; theory.md F6.
 
     Examples
     --------

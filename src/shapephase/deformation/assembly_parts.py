@@ -16,8 +16,6 @@ from ..shape_space.shape_path import ShapePath
 class Moments:
     """Terms of a part in the sums over all mass, about the frame's origin, at times (N,).
 
-    Attributes
-    ----------
     first, momentum : (N, 3) integrals of r dm [kg m] and of its rate v dm [kg m/s]
     second, flow : (N, 3, 3) integrals of r r^T dm [kg m^2] and of r v^T dm [kg m^2/s]
     vis_viva : (N,) integral of v.v dm, twice the energy in this frame [J]

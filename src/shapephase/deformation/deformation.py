@@ -172,6 +172,8 @@ class Deformation:
     def kinetic_energy(self, t: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """Kinetic energy about the centre of mass while this frame turns: times (...) -> (...) [J].
 
+        Source: Cabrera 2006, equation (4); theory.md A6.
+
         Parameters
         ----------
         angular_velocity : (3,) or t.shape + (3,) of this frame, its own axes [rad/s]; at rest it is T_0
@@ -182,10 +184,6 @@ class Deformation:
             If only the inertia is known, not the masses (`prescribed`, or a motion read from a file).
         ShapeError
             If `angular_velocity` has another shape.
-
-        Notes
-        -----
-        Source: Cabrera 2006, equation (4); theory.md A6.
         """
         times = times_argument(t, self.duration)
         omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
@@ -473,6 +471,8 @@ def particles(
     is then the closure. A function is scanned once before it is integrated (`Deformation.scan`, which has its own
     errors and warnings): velocities that are not those of the positions are refused.
 
+    Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, A7, A8.
+
     Parameters
     ----------
     masses : (m,) [kg], positive, two or more
@@ -489,10 +489,6 @@ def particles(
     SingularInertiaError
         If the particles are on one line at some time, which the message names: for samples at once, for a function
         when the inertia or the motion is computed.
-
-    Notes
-    -----
-    Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, A7, A8.
 
     Examples
     --------

@@ -55,8 +55,6 @@ class UserGauge(Protocol):
 class GivenFrames:
     """Frames that a user gives as functions of time.
 
-    Attributes
-    ----------
     frames : U(t) and its body rates
     breaks : (M,) times between which they are smooth, as far as is known [s]
     """

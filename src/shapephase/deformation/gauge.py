@@ -54,6 +54,9 @@ def in_gauge(
 ) -> Deformation:
     """The deformation seen from the frame turned by U(t).
 
+    Equation :eq:`gauge` of the documentation.
+    Source: theory.md B4.
+
     Parameters
     ----------
     u : times (N,) -> U (N, 3, 3), body rates of U (N, 3) [rad/s], hat(rate) = U^T U'; or U alone, which is then
@@ -81,11 +84,6 @@ def in_gauge(
     UndeclaredBreakWarning
         For kinks that are not breaks of the deformation; they are taken as breaks.
 
-    Notes
-    -----
-    Equation :eq:`gauge` of the documentation.
-    Source: theory.md B4.
-
     Examples
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
@@ -106,16 +104,14 @@ def in_gauge(
 def link_gauge(deformation: Deformation, link: str) -> Deformation:
     """The deformation of an articulated body seen from a link's frame: another base.
 
+    Source: theory.md B4 with U = R_base_link^T.
+
     Raises
     ------
     UnknownNameError
         If there is no such link.
     GaugeError
         If the deformation is not that of an articulated body.
-
-    Notes
-    -----
-    Source: theory.md B4 with U = R_base_link^T.
 
     Examples
     --------
@@ -135,15 +131,13 @@ def mean_body_gauge(deformation: Deformation, reference: float = 0.0) -> Deforma
     body as a whole is the least. It depends on the shape alone, so it closes with the shape; near the reference
     shape the internal momentum vanishes to first order, as in the horizontal gauge all along.
 
+    Source: Eckart 1935; Canavan and Likins 1977 (mean axes); Travers, Hatton and Choset 2013 (minimum perturbation).
+
     Raises
     ------
     GaugeError
         If only the inertia is known, or the nearest orientation is not unique somewhere (a shape like a mirror
         image of the reference).
-
-    Notes
-    -----
-    Source: Eckart 1935; Canavan and Likins 1977 (mean axes); Travers, Hatton and Choset 2013 (minimum perturbation).
 
     Examples
     --------
@@ -182,8 +176,6 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
     wheels store (`Deformation.stored_momentum`) does not count as L_o: it is what is left there.
     Source: Cabrera 2006, section 2.3.1 (a); theory.md B2.
 
-    Notes
-    -----
     Equation :eq:`horizontal-gauge` of the documentation.
 
     Examples
@@ -217,19 +209,18 @@ class _HorizontalFrames:
 def principal_gauge(deformation: Deformation) -> Deformation:
     """The deformation seen from its principal axes of inertia: the tensor is diagonal there, and the frame continuous.
 
-    Moments that cross are followed through; where they only come close the axes turn. Moments equal over an interval
-    turn the frame least. At t = 0 the moments ascend, the first two axes point along their largest base components,
-    and the third completes a proper frame. The closure of a loop, U(T) closure U(0)^T, is one of the 24 turns of an
-    octahedron: how the axes have changed places.
+    Moments that cross are followed through; where they only come close the axes turn. Where two are equal over an
+    interval, the frame goes on with the distinct axis and does not turn about it. At t = 0 the moments ascend, the
+    first two axes point along their largest base components, and the third completes a proper frame. The closure of a
+    loop, U(T) closure U(0)^T, is one of the 24 turns of an octahedron: how the axes have changed places.
+
+    Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
 
     Raises
     ------
     GaugeError
-        If the inertia has no continuous frame of principal axes.
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
+        If the inertia has no continuous frame of principal axes, or moments part after an interval along axes that
+        this frame does not have.
 
     Examples
     --------

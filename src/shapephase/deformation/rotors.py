@@ -36,8 +36,6 @@ _ROUND = 1e-6  # of a wheel's inertia, and of its radius of gyration: the digits
 class Rotor:
     """A wheel on its axle.
 
-    Attributes
-    ----------
     joint, link : names of the axle and of the wheel
     inertia : J about the axle [kg m^2]
     axle : (3,) unit vector in the axes of the link

@@ -32,6 +32,8 @@ class JointLoads:
 
     Made by `joint_torques`.
 
+    Equation :eq:`joint-work` of the documentation.
+
     Attributes
     ----------
     joint_names, joint_units : "rad" for torques in N m, "m" for forces in N
@@ -46,10 +48,6 @@ class JointLoads:
     energy_defect : batch, by how much the work of all joints, and of a torque from outside, misses it, of the work that
         joints do back and forth [1]
     effort_limits, rate_limits : (n,) of the body, infinite where none is stated
-
-    Notes
-    -----
-    Equation :eq:`joint-work` of the documentation.
     """
 
     joint_names: tuple[str, ...]

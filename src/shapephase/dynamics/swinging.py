@@ -75,6 +75,8 @@ def free_hinges(
     The hinges have no motor. Their accelerations are those with which inverse dynamics finds no effort in them, but
     that of their springs and dampers. What comes out is a path of all joints, and the motion along it.
 
+    Equation :eq:`free-hinges` of the documentation.
+
     Parameters
     ----------
     path : of the other joints
@@ -90,10 +92,6 @@ def free_hinges(
         For a joint that the body has not, no free joint, or a path of other joints than the rest.
     AccuracyNotReached
         If the tolerance cannot be met, as for a long swing that is chaotic.
-
-    Notes
-    -----
-    Equation :eq:`free-hinges` of the documentation.
 
     Examples
     --------

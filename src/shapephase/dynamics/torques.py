@@ -125,6 +125,10 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     The body floats, or falls: gravity, which moves all its parts alike, loads no joint. Followers load the joint that
     they follow by the work they do. Armatures, friction and the inertia of motors are not in it.
 
+    At a break of the path, where the acceleration jumps, the torque is the one that follows.
+    Equations :eq:`inverse-dynamics` and :eq:`base-acceleration` of the documentation.
+    Source: Featherstone 2008, Rigid Body Dynamics Algorithms, section 5.3; theory.md A6.
+
     Parameters
     ----------
     motion : of an articulated body, in any gauge; a torque from outside acts on the base
@@ -141,12 +145,6 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
         `Motion.save`.
     TrajectoryError
         For times outside of the motion.
-
-    Notes
-    -----
-    At a break of the path, where the acceleration jumps, the torque is the one that follows.
-    Equations :eq:`inverse-dynamics` and :eq:`base-acceleration` of the documentation.
-    Source: Featherstone 2008, Rigid Body Dynamics Algorithms, section 5.3; theory.md A6.
 
     Examples
     --------

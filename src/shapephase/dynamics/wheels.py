@@ -112,6 +112,8 @@ def with_free_wheels(
 def wheel_speeds(motion: Motion | ForcedMotion, t: ArrayLike) -> Array:
     """The speeds of wheels on their axles, in the order in which `articulated` was given them, speeds held last.
 
+    Equation :eq:`routh` of the documentation.
+
     Parameters
     ----------
     motion : of a deformation made by `articulated(..., rotors=, rotor_speeds=)`
@@ -125,10 +127,6 @@ def wheel_speeds(motion: Motion | ForcedMotion, t: ArrayLike) -> Array:
     ------
     WrongObjectError
         If the body has no such wheels.
-
-    Notes
-    -----
-    Equation :eq:`routh` of the documentation.
 
     Examples
     --------

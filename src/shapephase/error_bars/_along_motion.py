@@ -57,8 +57,6 @@ _LAST = (
 class AlongMotion:
     """A motion at N nodes.
 
-    Attributes
-    ----------
     times, weights : (N,) [s]
     shapes, rates : (N, n)
     attitudes : (N, 3, 3) of the motion, base axes to inertial axes
@@ -288,8 +286,6 @@ class ForcedAlong:
 
         eta' = G (l x eta + k + s),  k' = eta x f for a torque in base axes, 0 for one in inertial axes.
 
-    Attributes
-    ----------
     times, weights : (N,) [s]
     shapes, rates : (N, n)
     attitudes : (N, 3, 3) base axes to inertial axes
@@ -359,8 +355,6 @@ def _forced_at_nodes(motion: ForcedMotion, path: ShapePath, edges: Array) -> For
 class BodyAlong:
     """A body at N shapes and rates of a path.
 
-    Attributes
-    ----------
     body : the body of the path
     times : (N,) [s]
     shapes, rates : (N, n)

@@ -128,8 +128,6 @@ def _likely_axes(deformation: Deformation, times: Array, recorded: Array) -> lis
 class FlightFit:
     """Least squares over momentum and start, and the axes or the bias where they are to be found.
 
-    Attributes
-    ----------
     deformation, tolerance, find_axes, find_bias : as given
     times : (N,)
     recorded, rates : (N, 3, 3) and (N, 3) what is fitted, or None

@@ -32,8 +32,6 @@ _MOST_MODES = 6  # Legendre polynomials of a momentum in time: more resolve less
 class ResidualNoise:
     """Probability of each kind and length of correlation, and the parameters of the fit that follow.
 
-    Attributes
-    ----------
     weights : (F,) of the correlations; their sum is one
     variances : (F,) of each residual [rad^2], the larger of what is left of whitened and of plain residuals: where the
         kind does not fit, as of a filter's stop band, whitened ones are too small

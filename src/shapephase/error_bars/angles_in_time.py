@@ -38,6 +38,9 @@ def somersault_bars(
 
     The axes, found or given, count as exact.
 
+    Raises like `uncertainty` and `Motion.athlete_axes`, too. Equations :eq:`added-momentum` and :eq:`moved-fit` of the
+    documentation, for the attitude at each time.
+
     Parameters
     ----------
     motion : of an athlete, no batch, of an articulated body
@@ -51,11 +54,6 @@ def somersault_bars(
         For times that do not ascend.
     ChartPoleError
         Where the tilt is a right angle, to 1e-6 rad.
-
-    Notes
-    -----
-    Raises like `uncertainty` and `Motion.athlete_axes`, too. Equations :eq:`added-momentum` and :eq:`moved-fit` of the
-    documentation, for the attitude at each time.
 
     Examples
     --------

@@ -134,6 +134,9 @@ def uncertainty(
     Sources are independent of each other; inputs without errors are exact. The cost is that of a few reconstructions,
     however many samples and links there are.
 
+    Equation :eq:`covariance` of the documentation.
+    Source: the derivatives are those of `derivatives`.
+
     Parameters
     ----------
     motion : of an articulated body; under a torque that is a function of time alone, whose bars are those of the state
@@ -165,11 +168,6 @@ def uncertainty(
         For a link that the body does not have, or a joint that turns no wheel.
     TrajectoryError
         For a text that is not an amount.
-
-    Notes
-    -----
-    Equation :eq:`covariance` of the documentation.
-    Source: the derivatives are those of `derivatives`.
 
     Examples
     --------
@@ -217,6 +215,8 @@ def sampled_uncertainty(
 
     400 draws give a standard deviation to 4 %. The bias of smoothing is alike in all of them, and is not in the bars.
 
+    Raises like `uncertainty` and `reconstruct`.
+
     Parameters
     ----------
     motion, joints, inertias, momentum, attitude, start, rotors : as for `uncertainty`; errors are normally distributed,
@@ -225,10 +225,6 @@ def sampled_uncertainty(
     seed : of the random numbers
     executor : of `concurrent.futures`, or of a cluster (`distributed.Client.get_executor()`), that reconstructs the
         motions; None: one after the other, here. Results do not depend on it
-
-    Notes
-    -----
-    Raises like `uncertainty` and `reconstruct`.
 
     Examples
     --------

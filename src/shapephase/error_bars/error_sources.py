@@ -59,8 +59,6 @@ class InertiaErrors:
 class Inputs(NamedTuple):
     """Covariances of inexact inputs: variances (m,) or matrices (m, m); None where an input is exact.
 
-    Attributes
-    ----------
     samples : of the path's samples
     links : of the relative errors of each frame of the body's chain: mass, centre (3), inertia
     momentum, attitude : (3, 3)

@@ -73,15 +73,13 @@ class Derivatives:
     One integral along the motion serves all numbers of a kind, however many there are: its integrand is carried to
     the end by the adjoint of the attitude equation.
 
+    Source: theory.md section 8.
+
     Attributes
     ----------
     motion : the motion
     body, path : its body, and its path of the joints that are not wheels
     rotors : its wheels
-
-    Notes
-    -----
-    Source: theory.md section 8.
     """
 
     def __init__(self, motion: Motion) -> None:
@@ -253,16 +251,14 @@ def _changes(sums: Array) -> _Changes:
 def derivatives(motion: Motion) -> Derivatives:
     """The exact derivatives of a motion's results by its path, its body's inertias, momentum and initial attitude.
 
+    Equations :eq:`added-momentum` and :eq:`adjoint` of the documentation.
+
     Raises
     ------
     WrongObjectError
         If it is not a motion of an articulated body.
     ShapeError
         If the motion is a batch.
-
-    Notes
-    -----
-    Equations :eq:`added-momentum` and :eq:`adjoint` of the documentation.
 
     Examples
     --------
@@ -277,8 +273,6 @@ def derivatives(motion: Motion) -> Derivatives:
 class Described(NamedTuple):
     """What a motion of a body with joints is made of.
 
-    Attributes
-    ----------
     body : with the wheels
     path : of the joints that are not wheels
     route : the path with columns for all joints

@@ -28,8 +28,6 @@ _DOUBLED = np.array([1.0 if i == j else 2.0 for i, j in VOIGT])  # entries that 
 class WheelsAlong:
     """Wheels at N times of a motion, in whose shapes their own joints rest.
 
-    Attributes
-    ----------
     body : the body with the wheels
     rotors : the wheels, W of them
     times : (N,) [s]

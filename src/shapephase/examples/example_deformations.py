@@ -61,6 +61,8 @@ def homothety(
 
     It moves as the rigid body with inertia I_0 in the time tau = int a^-2 dt, and its phase is the rigid one.
 
+    Source: Cabrera 2006, example 4.3; theory.md F1.
+
     Parameters
     ----------
     scale : None: `pulsation()`
@@ -72,10 +74,6 @@ def homothety(
     ------
     TrajectoryError
         If Pi never comes back and no duration is given, or the clock does not belong to the scale.
-
-    Notes
-    -----
-    Source: Cabrera 2006, example 4.3; theory.md F1.
 
     Examples
     --------
@@ -120,6 +118,8 @@ def axial_as_printed(
     Such a body gets wider and keeps its transverse moments by getting shorter; no body has I_1 > 2 I_2, where it
     would be flatter than flat (C-E13).
 
+    Source: Cabrera 2006, example 4.4; theory.md F2, C-E13.
+
     Parameters
     ----------
     axial, transverse : I_1(0) and I_2 [kg m^2]
@@ -127,10 +127,6 @@ def axial_as_printed(
     momentum : (3,) with a part along axis 1
     duration : [s]; None: one loop of Pi
     on_unphysical : as for `prescribed`
-
-    Notes
-    -----
-    Source: Cabrera 2006, example 4.4; theory.md F2, C-E13.
 
     Examples
     --------
@@ -163,15 +159,13 @@ def axial_stretch(
     With h = length + speed t the integral of 1/I_2 is an arctangent. Pi circles the axis at the rate
     Pi_1 (1/I_2 − 1/I_1), and after its first loop, at T, the phase is l int_0^T dt/I_2 modulo 2 pi.
 
+    Source: Cabrera 2006, example 4.4, by what its text describes; theory.md F2b, C-E13.
+
     Parameters
     ----------
     mass, radius, length : [kg], [m], [m]
     speed : above 0 [m/s]
     momentum, duration : as for `axial_as_printed`
-
-    Notes
-    -----
-    Source: Cabrera 2006, example 4.4, by what its text describes; theory.md F2b, C-E13.
 
     Examples
     --------
@@ -214,6 +208,8 @@ def printed_antenna(
 
     No body has a moment above the sum of the two others (C-E13): I_1 ends at I_2 + I_3 and I_3 at I_1 + I_2.
 
+    Source: Cabrera 2006, example 4.5; theory.md F3, F4, C-E13.
+
     Parameters
     ----------
     axis : 1 or 3
@@ -227,10 +223,6 @@ def printed_antenna(
     ------
     ShapeError
         For another axis, or if the moment does not grow.
-
-    Notes
-    -----
-    Source: Cabrera 2006, example 4.5; theory.md F3, F4, C-E13.
 
     Examples
     --------
@@ -291,6 +283,8 @@ def dipole_antenna(
     largest moment, if it is that of the axis, becomes the smallest: the paper's conclusion for its example 4.5 holds
     for the printed model only. Along the axis of the smallest moment the order of the moments does not change.
 
+    Source: theory.md F4b, C-E13.
+
     Parameters
     ----------
     axis : 1, 2 or 3
@@ -303,10 +297,6 @@ def dipole_antenna(
     ------
     ShapeError
         For another axis.
-
-    Notes
-    -----
-    Source: theory.md F4b, C-E13.
 
     Examples
     --------
@@ -339,16 +329,14 @@ def furniture(
     axis 3, the spacecraft turns about that axis alone, by (l duration − 2 pi m radius²)/(I_3 + m radius²): the second
     term is the holonomy, the same at every speed. Otherwise there is no closed form.
 
+    Source: Cabrera 2006, example 2.2; theory.md F6.
+
     Parameters
     ----------
     duration : of the walk [s]
     hub_mass, hub : mass of the spacecraft [kg], its (3,) principal moments within the triangle inequality [kg m^2]
     mass, radius : what moves and how far from the centre [kg], [m]
     height : of the circle along axis 3 [m]
-
-    Notes
-    -----
-    Source: Cabrera 2006, example 2.2; theory.md F6.
 
     Examples
     --------
@@ -465,8 +453,6 @@ def linked_pentagon() -> ParticleBody:
     where f = 1.1 (a + i b)/sqrt(1 + a^2 + b^2) and c closes the chain. The loop of zero curvature turns it by
     28.15937237 degrees, the most for one round.
 
-    Notes
-    -----
     Source: Tong and Dullin 2012, The equilateral pentagon at zero angular momentum.
 
     Examples

@@ -401,8 +401,6 @@ class _KaneScher:
 class _CatRighting:
     """Every joint of the cat from the bend, which rises and falls, and its direction (ny, nz), which goes once round.
 
-    Attributes
-    ----------
     largest_bend : of the waist [rad]
     tail_share : of the bend that the tail makes, relative
     twist : of the waist beyond that which bends it without twist, against the direction of the bend [rad]

@@ -44,6 +44,8 @@ def slow_antenna(
 
     It lasts for one and a quarter rigid periods.
 
+    Source: Cabrera 2006, remark 4.6, with the scale corrected (C-E12); orders derived here; theory.md F5.
+
     Parameters
     ----------
     rate : above 0 [1/s]
@@ -51,10 +53,6 @@ def slow_antenna(
     moments : (3,), ascending [kg m^2]
     expansion : relative increase of I_3 where f is 1, above 0
     momentum : (3,), on an orbit about axis 3
-
-    Notes
-    -----
-    Source: Cabrera 2006, remark 4.6, with the scale corrected (C-E12); orders derived here; theory.md F5.
 
     Examples
     --------

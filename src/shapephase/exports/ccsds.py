@@ -63,6 +63,8 @@ def write_aem(
     near to each other as the error requires where a reader interpolates as the message states: each part of the
     quaternion by Lagrange's polynomial of degree 7 through the eight records nearest to a time.
 
+    Source: CCSDS 504.0-B-1, Attitude Data Messages, section 4.
+
     Parameters
     ----------
     motion : a single one, in any gauge
@@ -80,10 +82,6 @@ def write_aem(
         If millions of records were needed: the polynomials do not take kinks well.
     UnknownNameError
         For another time system, an invalid epoch.
-
-    Notes
-    -----
-    Source: CCSDS 504.0-B-1, Attitude Data Messages, section 4.
 
     Examples
     --------

@@ -107,8 +107,6 @@ class FamilySamples:
     ) -> Differences | None:
         """Bounds over a part of the family's box; None where it is too large for any.
 
-        Parameters
-        ----------
         box : (n, 2)
         centre : its member there
         growth : of attitude errors along the motion of that member

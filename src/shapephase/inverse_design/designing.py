@@ -85,6 +85,9 @@ def design(
     are the shortest ones, measured by the widths of the box. Where they fail, enclosures exclude boxes of parameters
     one by one, so that a goal that no member meets is shown to be such.
 
+    Equation :eq:`family-distance` of the documentation. Errors of the family are passed on.
+    Source: Cabrera 2006, section 4, read backwards; the enclosure is derived here.
+
     Parameters
     ----------
     family : parameters (n,) -> deformation, smooth in them, with its duration and breaks
@@ -107,11 +110,6 @@ def design(
         If no member was found: its `best` is the nearest, its `cover` the enclosures where there is none.
     ShapeError
         For no goal, a box or start that does not fit, and phases without momentum.
-
-    Notes
-    -----
-    Equation :eq:`family-distance` of the documentation. Errors of the family are passed on.
-    Source: Cabrera 2006, section 4, read backwards; the enclosure is derived here.
 
     Examples
     --------

@@ -23,8 +23,6 @@ class BallChart:
 
     The shape is affine in s, and every turn but those of half a turn has one s.
 
-    Attributes
-    ----------
     starts : each ball joint, the index of its first number among the coordinates, and its quaternion at the start
     """
 

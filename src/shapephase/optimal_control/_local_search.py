@@ -37,8 +37,6 @@ _WINDING_SAMPLES = 50  # attitudes per piece: so close together that unwrapping 
 class Attempt:
     """Result of one local search.
 
-    Attributes
-    ----------
     report : its summary for the user
     polished : its path, corrected; None where that could not be reconstructed
     cost : cost of the corrected path; infinite where there is none
@@ -85,8 +83,6 @@ def guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Ar
 class LocalSearch:
     """Search for the local optimum next to a guess.
 
-    Attributes
-    ----------
     program : program for the spline of the path at first
     halvings : how often pieces may be halved; never where the user gave their number
     settles : whether the solver may end where the cost of a long motion has settled

@@ -12,13 +12,13 @@ from ..arrays import Array
 from ..body.body import Body
 from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
+from ..chebyshev import gauss_tableau
 from ..dynamics.torques import joint_torques
 from ..errors import AccuracyNotReached
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.body_path import as_path, route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
-from ._spline_basis import gauss_tableau
 from .cost_metric import METRIC_COSTS, CostMetric, metric_argument
 
 _NODES = 12  # Gauss nodes of a panel: exact for the rate cost of a cubic spline, ample for smooth paths

@@ -35,8 +35,6 @@ _NEAR = 1e-3  # [m] beyond the clearance, up to which pairs are watched at all t
 class Margins:
     """Pairs of links whose distance a program bounds.
 
-    Attributes
-    ----------
     beyond : by how much the nodes keep each pair farther apart than the clearance [m]
     nodes : number of Gauss nodes in a piece at which distances are bounded
     """
@@ -92,8 +90,6 @@ def effort_shares(task: Reorientation, basis: SplineBasis, motion: Motion) -> Ar
 def tightened(room: Array | None, shares: Array, stages: int, rounds: int) -> Array:
     """Shares of limits for efforts at the places of a program, where a path took up too much between them.
 
-    Parameters
-    ----------
     room : at the nodes, `stages` a piece, and the ends of pieces (places, l); None: all of their limits
     shares : (pieces, l) of the path
     rounds : number of earlier calls

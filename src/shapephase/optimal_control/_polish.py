@@ -8,11 +8,12 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Mask
+from ..chebyshev import gauss_tableau
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._plan_limits import derivative_limits, shortest_duration
-from ._spline_basis import SplineBasis, gauss_tableau
+from ._spline_basis import SplineBasis
 from ._via_points import via_rows
 from .task import Reorientation, motion_along
 
@@ -32,8 +33,6 @@ _RANK = 1e-10  # share of the largest singular value below which held rates depe
 class PolishedPath:
     """A path corrected to reach the goal as far as possible.
 
-    Attributes
-    ----------
     control : (k, m) control points
     duration : [s]
     path, motion : path of all joints, and its reconstruction
@@ -182,8 +181,6 @@ def _roots(basis: SplineBasis, free: Mask) -> list[tuple[Mask, Array]]:
 class _ActiveSet:
     """Limits of rates, accelerations and jerks that a correction holds as equations.
 
-    Attributes
-    ----------
     bounding : (j, k) rows of all bounded derivatives, by place, from control points of the path
     limits : (j, m)
     active : (j, m) which of them are held

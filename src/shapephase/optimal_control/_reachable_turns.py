@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.integrate import quad
 
 from .. import so3
 from ..arrays import Array, Integers
@@ -27,82 +25,44 @@ _SEED = 54
 _NOISE = 1e-10  # relative to the curvature's terms: exact symmetries leave 1e-14; less needs 1e9 loops
 _NOTHING = 1e-13  # [rad per stroke, or its square] of rounding in motions that turn nothing
 _LEAST_MISS = 1e-6  # [rad] by which a goal must be missed: rounding of user input is left to the search
-_PLACES = 1001  # on a curve of attitudes, which are close up to a length of
-_LONGEST = 60.0  # strokes
-_MOST_PLACES = 100_000
-_BETWEEN = 1.5  # factor by which a slope may exceed its sampled maximum
 _RADII = (np.pi, np.pi / 8.0, np.pi / 64.0)  # [strokes] about the start, where shapes are drawn if limits are wider
 
 
 @dataclass(frozen=True, eq=False)
 class _ReachableTurns:
-    """Superset of the attitudes in which a motion can end: exp(angle axis) attitudes[k], inertial axes.
+    """Superset of the attitudes in which a motion can end: exp(angle axis) attitude for any angle, inertial axes.
 
-    Attributes
-    ----------
-    attitudes : (k, 3, 3)
-    links : (k, 3, 3) attitude of the link that is pointed against the base
+    attitude : (3, 3)
+    link : (3, 3) attitude of the link that is pointed against the base
     axis : (3,) unit vector; None: the angle is 0
-    angles : (least, most) [rad]; None: any
-    counted : (2,) somersault and twist of the motion [rad], NaN where free
-    slack : largest distance of an attitude of the set from those listed [rad]
     reason : restriction of the motion, in words
     remedy : advice, in words
     """
 
-    attitudes: Array
-    links: Array
+    attitude: Array
+    link: Array
     reason: str
     remedy: str
     axis: Array | None = None
-    angles: tuple[float, float] | None = None
-    counted: Array | None = None
-    slack: float = 0.0
 
     def goal_error(self, task: Reorientation) -> float:
         """Least distance of a goal from all these attitudes [rad]: a lower bound."""
-        counted = 0.0
-        if task.windings is not None:
-            windings = np.full(2, np.nan) if self.counted is None else self.counted.copy()
-            if self.angles is not None:
-                windings[0] = np.clip(task.windings[0], *self.angles)
-            counted = float(np.nanmax(np.abs(windings - task.windings), initial=0.0))
-        if task.target is None:
-            axis, direction = task.pointing_axes()
-            pointed = so3.apply(self.attitudes @ self.links, axis)
-            gaps = so3.angle_between(direction, pointed)
-            if self.axis is not None:
-                gaps = np.abs(so3.angle_between(self.axis, pointed) - so3.angle_between(self.axis, direction))
-        else:
-            apart = task.target @ np.swapaxes(self.attitudes, -1, -2)
-            gaps = so3.angle(apart)
-            if self.axis is not None:
-                about = self._nearest_angles(apart, task)
-                gaps = so3.angle(np.swapaxes(so3.exp(about[:, None] * self.axis), -1, -2) @ apart)
-        return max(counted, float(gaps.min())) - self.slack
+        if task.target is not None:
+            return float(so3.angle(task.target @ self._nearest(task.target).T))
+        axis, direction = task.pointing_axes()
+        pointed = self.attitude @ self.link @ axis
+        if self.axis is None:
+            return float(so3.angle_between(direction, pointed))
+        return float(np.abs(so3.angle_between(self.axis, pointed) - so3.angle_between(self.axis, direction)))
 
     def nearest_turn(self, task: Reorientation) -> Array | None:
         """Rotation vector of the attitude nearest to a goal (3,); None for a pointed axis."""
-        if task.target is None:
-            return None
-        apart = task.target @ np.swapaxes(self.attitudes, -1, -2)
-        if self.axis is None:
-            return so3.log(self.attitudes[int(np.argmin(so3.angle(apart)))])
-        return so3.log(so3.exp(self._nearest_angles(apart, task)[0] * self.axis) @ self.attitudes[0])
+        return None if task.target is None else so3.log(self._nearest(task.target))
 
-    def _nearest_angles(self, apart: Array, task: Reorientation) -> Array:
-        """Angles about the axis nearest to some rotations: (k, 3, 3) -> (k,)."""
+    def _nearest(self, target: Array) -> Array:
         if self.axis is None:
-            return np.zeros(len(apart))
-        free = np.asarray(so3.angle_about(apart, self.axis))
-        if self.angles is None:
-            return free
-        least, most = self.angles
-        if task.windings is not None:
-            return np.clip(np.full(len(free), task.windings[0]), least, most)
-        beyond = np.mod(free - least, 2.0 * np.pi)
-        past = beyond - (most - least)
-        return np.where(past <= 0.0, least + beyond, np.where(past < 2.0 * np.pi - beyond, most, least))
+            return self.attitude
+        return so3.exp(so3.angle_about(target @ self.attitude.T, self.axis) * self.axis) @ self.attitude
 
 
 def check_reachable(tasks: Sequence[Reorientation]) -> None:
@@ -133,40 +93,28 @@ def check_reachable(tasks: Sequence[Reorientation]) -> None:
 
 def _reachable_turns(task: Reorientation) -> _ReachableTurns | None:
     """Return the smallest known superset of the attitudes at the end; None where none is known."""
-    body, moves = task.body, np.flatnonzero(task.movable)
+    moves = np.flatnonzero(task.movable)
     if not len(moves):
         return _rigid_turns(task)
-    still = not task.momentum.any()
-    if still and task.end is not None:
+    if task.end is not None and not task.momentum.any():
         turns = _loop_turns(task, moves)
         if turns is not None:
             return turns
-    elif still and len(moves) == 1 and (task.upper - task.lower)[moves[0]] < _LONGEST * _strokes(task)[moves[0]]:
-        return _one_joint_turns(task, moves[0])
-    return _planar_turns(task, moves) if _is_analytic(body) else None
+    return _planar_turns(task, moves) if _is_analytic(task.body) else None
 
 
 def _rigid_turns(task: Reorientation) -> _ReachableTurns | None:
-    shape = task.shapes(task.start)
-    links = _link_attitudes(task, shape[None])
+    link = _link_attitude(task)
     remedy = "let joints move: leave out joints (--joints), or widen their limits, Limits(joint_limits=False)"
     reason = "none of the joints can move, as they are held or both of their limits are the same"
     if not task.momentum.any():
-        return _ReachableTurns(np.eye(3)[None], links, f"{reason}, and without momentum nothing turns it", remedy)
-    inertia = task.body.locked_inertia(shape)
-    motion = reconstruct(rigid(inertia, task.duration), task.momentum)
-    rate = float(np.linalg.norm(task.momentum) / np.linalg.eigvalsh(inertia)[0])
-    steps = max(_PLACES, int(20.0 * rate * task.duration))
-    if steps > _MOST_PLACES:
+        return _ReachableTurns(np.eye(3), link, f"{reason}, and without momentum nothing turns it", remedy)
+    if task.cost == "time" or task.windings is not None:
         return None
-    attitudes = motion.attitude(np.linspace(0.0, task.duration, steps))
+    motion = reconstruct(rigid(task.body.locked_inertia(task.shapes(task.start)), task.duration), task.momentum)
     reason = f"{reason}: it turns like a rigid body with the momentum {_text(task.momentum)} kg m^2/s"
     remedy = f"{remedy}, or give another momentum or duration (--momentum, --duration)"
-    if task.cost == "time":
-        links, slack = np.broadcast_to(links, attitudes.shape), 0.5 * rate * task.duration / (steps - 1)
-        return _ReachableTurns(attitudes, links, reason, remedy, slack=slack)
-    counted = None if task.windings is None else task.counted_windings(attitudes)
-    return _ReachableTurns(attitudes[-1:], links, reason, remedy, counted=counted)
+    return _ReachableTurns(motion.final_attitude, link, reason, remedy)
 
 
 def _loop_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
@@ -189,9 +137,7 @@ def _loop_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
     if not closed:
         reason += f", and the way to the end by {_text(so3.log(straight))} rad"
     remedy = f"{_more_joints(task)}, or end elsewhere (end='free', --to free)"
-    return _ReachableTurns(
-        straight[None], np.eye(3)[None], reason, remedy, axis=axes[0] if len(axes) else None, slack=1e-9
-    )
+    return _ReachableTurns(straight, np.eye(3), reason, remedy, axis=axes[0] if len(axes) else None)
 
 
 def _holonomy_axes(task: Reorientation, moves: Integers) -> Array | None:
@@ -227,36 +173,6 @@ def _axes(vectors: Array, magnitude: float) -> Array:
     return axes * np.sign(largest)
 
 
-def _one_joint_turns(task: Reorientation, column: int) -> _ReachableTurns:
-    """Attitudes without momentum at a free end of one joint, along its way between its limits."""
-    body, start = task.body, task.shapes(task.start)
-    attitudes, shapes, slack = [np.eye(3)[None]], [start[None]], 0.0
-    for limit in (task.lower[column], task.upper[column]):
-        if limit == task.start[column]:
-            continue
-        end = task.start.copy()
-        end[column] = limit
-        path = ShapePath.waypoints([0.0, 1.0], [start, task.shapes(end)])
-        places = np.linspace(0.0, 1.0, _PLACES)
-        attitudes.append(horizontal_lift(body, path, 1e-10).attitude(places))
-        shapes.append(path.shape(places))
-        turned = (mechanical_connection(body, shapes[-1]) @ task.coupling)[:, :, column]
-        rates = np.linalg.norm(turned, axis=-1)
-        if task.link is not None:
-            speeds = np.broadcast_to(task.coupling[:, column], shapes[-1].shape)
-            rates += np.linalg.norm(task.links.link_angular_velocity(shapes[-1], speeds, task.link), axis=-1)
-        slack = max(slack, 0.5 * _BETWEEN * float(rates.max()) * abs(limit - task.start[column]) / (_PLACES - 1))
-    name = _names(task, np.array([column]))
-    return _ReachableTurns(
-        np.concatenate(attitudes),
-        _link_attitudes(task, np.concatenate(shapes)),
-        f"only {name} can move, with one freedom, and where it ends, between its limits, determines the turn (holonomy "
-        "algebra of rank 0)",
-        f"{_more_joints(task)}, or widen the limits: Limits(joint_limits=False)",
-        slack=slack,
-    )
-
-
 def _planar_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
     """Attitudes where all turns, the momentum and a principal axis of inertia at all shapes have one axis."""
     body, coordinates = task.body, _drawn(task)
@@ -273,67 +189,20 @@ def _planar_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | Non
     axes = _axes(vectors, magnitude)
     if len(axes) > 1:
         return None
-    links = _link_attitudes(task, task.shapes(task.start)[None])
+    link, remedy = _link_attitude(task), _more_joints(task)
     if not len(axes):
-        return _ReachableTurns(
-            np.eye(3)[None],
-            links,
-            f"motions of {_names(task, moves)} turn the body not at all (holonomy algebra of rank 0)",
-            _more_joints(task),
-        )
+        reason = f"motions of {_names(task, moves)} turn the body not at all (holonomy algebra of rank 0)"
+        return _ReachableTurns(np.eye(3), link, reason, remedy)
     axis = axes[0] if not size else task.momentum / size
     reason = f"motions of {_names(task, moves)} turn the body about one axis alone, {_text(axis)}"
-    remedy = _more_joints(task)
-    plane = _ReachableTurns(np.eye(3)[None], links, f"{reason} (holonomy algebra of rank 1 at most)", remedy, axis=axis)
     if not size:
-        return plane
+        return _ReachableTurns(np.eye(3), link, f"{reason} (holonomy algebra of rank 1 at most)", remedy, axis=axis)
     inertias = body.locked_inertia(shapes)
     across = so3.apply(so3.hat(axis), inertias @ axis)
     if np.abs(across).max() > _NOISE * np.abs(inertias).max():
         return None
-    plane = replace(
-        plane,
-        reason=f"{reason}, that of the momentum",
-        remedy=f"{remedy}, or give another momentum (--momentum)",
-        counted=np.array([np.nan, 0.0]),
-    )
-    return _with_angles(task, moves, plane) if len(moves) == 1 and task.end is not None else plane
-
-
-def _with_angles(task: Reorientation, moves: Integers, plane: _ReachableTurns) -> _ReachableTurns:
-    """Plane with the angles to which a momentum turns a planar body of one joint."""
-    column, axis, body = int(moves[0]), plane.axis, task.body
-    lower, upper = task.lower[column], task.upper[column]
-    mover = int(np.argmax(np.abs(task.coupling[:, column])))
-    if np.count_nonzero(task.coupling) == 1 and body.follows.is_identity and body.joint_units[mover] == "rad":
-        upper = min(upper, lower + 2.0 * np.pi)
-    if axis is None or task.end is None or upper - lower > _LONGEST * _strokes(task)[column]:
-        return plane
-
-    def along(values: ArrayLike) -> Array:
-        coordinates = np.repeat(task.start[None], np.size(values), axis=0)
-        coordinates[:, column] = values
-        return task.shapes(coordinates)
-
-    def turned(value: float) -> float:
-        return float(-axis @ (mechanical_connection(body, along(value)) @ task.coupling)[0, :, column])
-
-    inertia = body.locked_inertia(along(np.linspace(lower, upper, 10 * _PLACES))) @ axis @ axis
-    margin = 0.5 * _BETWEEN * float(np.abs(np.diff(inertia)).max())
-    impulse = float(np.linalg.norm(task.momentum)) * task.duration
-    least = 0.0 if task.cost == "time" else impulse / (inertia.max() + margin)
-    most = impulse / max(inertia.min() - margin, 0.5 * inertia.min())
-    way = float(quad(turned, task.start[column], task.end[column], epsabs=1e-9, epsrel=0.0, limit=1000)[0])
-    return replace(
-        plane,
-        angles=(way + least, way + most),
-        reason=(
-            f"the momentum {_text(task.momentum)} kg m^2/s turns the body by {np.degrees(way + least):.4g} to "
-            f"{np.degrees(way + most):.4g} degrees in {task.duration:g} s, whatever {_names(task, moves)} does"
-        ),
-        remedy=f"{plane.remedy} or duration (--duration)",
-        slack=1e-6,
-    )
+    remedy = f"{remedy}, or give another momentum (--momentum)"
+    return _ReachableTurns(np.eye(3), link, f"{reason}, that of the momentum", remedy, axis=axis)
 
 
 def _drawn(task: Reorientation) -> Array:
@@ -361,11 +230,9 @@ def _strokes(task: Reorientation) -> Array:
     return np.where((np.abs(task.coupling) * slides[:, None]).any(axis=0), radius, 1.0)
 
 
-def _link_attitudes(task: Reorientation, shapes: Array) -> Array:
-    """Attitude of the pointed link, base axes: (N, n) -> (N, 3, 3); the identity for the base."""
-    if task.link is None:
-        return np.broadcast_to(np.eye(3), (len(shapes), 3, 3))
-    return task.links.link_pose(shapes, task.link)[:, :3, :3]
+def _link_attitude(task: Reorientation) -> Array:
+    """Attitude of the pointed link at the start, base axes: (3, 3); the identity for the base."""
+    return np.eye(3) if task.link is None else task.links.link_pose(task.shapes(task.start), task.link)[:3, :3]
 
 
 def _more_joints(task: Reorientation) -> str:

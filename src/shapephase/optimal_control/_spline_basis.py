@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, Mask
+from ..chebyshev import gauss_tableau
 from ..shape_space.shape_path import ShapePath
 
 _DEGREE = 3  # twice differentiable: the acceleration cost is finite, and `ShapePath.spline` reads it back
@@ -21,8 +22,6 @@ class SplineBasis:
     The functions that `ShapePath.spline(..., periodic=False)` makes of values at the ends of the pieces. A spline lies
     between the least and the largest of its control points, its rate between those of the rate.
 
-    Attributes
-    ----------
     pieces : six or more
     """
 
@@ -98,8 +97,6 @@ class SplineBasis:
     def end_conditions(self, equal: int, *, end_moves: bool, periodic: bool) -> Array:
         """Rows whose products with the control points are zero: (j, k).
 
-        Parameters
-        ----------
         equal : number of equal control points at the end; counts only where the last of them moves
         end_moves : whether the end is free
         periodic : whether the rates at both ends are equal
@@ -134,13 +131,3 @@ class SplineBasis:
         """Return the spline with control points (k, n) as a path of the joints."""
         values = self.matrix(self.nodes) @ control
         return ShapePath.spline(self.nodes * duration, values, periodic=False, joint_names=joint_names)
-
-
-def gauss_tableau(stages: int) -> tuple[Array, Array, Array]:
-    """Gauss nodes and weights on [0, 1], and the integrals from 0 to each node of the polynomials through the nodes."""
-    nodes, weights = np.polynomial.legendre.leggauss(stages)
-    places = 0.5 * (nodes + 1.0)
-    powers = np.arange(stages)
-    values = places[:, None] ** powers
-    integrals = places[:, None] ** (powers + 1) / (powers + 1)
-    return places, 0.5 * weights, np.asarray(np.linalg.solve(values.T, integrals.T).T, dtype=np.float64)

@@ -28,8 +28,6 @@ _EVENNESS = 0.1  # weight of even spacing against nearness: decides where guesse
 class ViaPoint:
     """A waypoint of a task.
 
-    Attributes
-    ----------
     columns, values : (j,) indices and values of the coordinates that it fixes
     place : time as a share of the duration; None: open
     """

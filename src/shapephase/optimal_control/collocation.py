@@ -10,9 +10,10 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ..chebyshev import gauss_tableau
 from ._plan_limits import Margins
 from ._polish import end_conditions
-from ._spline_basis import SplineBasis, gauss_tableau
+from ._spline_basis import SplineBasis
 from ._via_points import open_points, symbolic_via_rows
 from .nodes.node_distances import DistanceTerms
 from .nodes.node_efforts import EffortTerms
@@ -40,8 +41,6 @@ _STOPPED = "User_Requested_Stop"  # after Ctrl-C between iterations, or a callba
 class NlpSolution:
     """Final iterate of a nonlinear program.
 
-    Attributes
-    ----------
     control : (k, m) control points of the free coordinates [rad or m]
     duration : [s]
     attitude : (3, 3) at the end, by the program's own discretisation
@@ -238,8 +237,6 @@ class CollocationProgram:
     ) -> NlpSolution:
         """Return the local optimum from a guess: control points (k, m), T, attitudes at places (N,) -> (N, 4).
 
-        Parameters
-        ----------
         via_places : (v,) guessed places of waypoints
         settles : whether the search may end where the cost changes no more
         room : shares of their limits for efforts at the nodes and the ends of pieces, (places, l); None: 1

@@ -26,8 +26,6 @@ _ASYMMETRY = 1e-9  # of the largest entry: rounding of user input
 class CostMetric:
     """Metric of a cost as a function of the shape.
 
-    Attributes
-    ----------
     name : "kinetic", "rate", or "metric" where it is given
     metric : `casadi.Function` r (n,) -> g (n, n)
     key : equal for equal metrics of a body

@@ -88,6 +88,9 @@ def plan_reorientation(
     The attitude is the identity at the start. The path is a C2 cubic spline, corrected until the motion that the
     library's integrator reconstructs from it reaches the goal.
 
+    Equation :eq:`isoholonomic` of the documentation.
+    Source: Montgomery 1990, Isoholonomic problems and some applications.
+
     Parameters
     ----------
     goal : (3, 3) attitude at the end, or any of several (k, 3, 3); or a `Goal`: an axis to be pointed, of the base or
@@ -134,11 +137,6 @@ def plan_reorientation(
     -----
     UnstatedLimitWarning
         If `limits` takes rates or efforts from the body's file, which states none for a joint.
-
-    Notes
-    -----
-    Equation :eq:`isoholonomic` of the documentation.
-    Source: Montgomery 1990, Isoholonomic problems and some applications.
 
     Examples
     --------
@@ -314,8 +312,6 @@ def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> Attempt:
 class _SearchMonitor:
     """Reports the progress of a search to the user's callback, and stops it on request or at its time limit.
 
-    Attributes
-    ----------
     end : when the time limit is reached [s since 1970]: a clock that other processes share
     stopped : reason why the search was stopped, "stopped" or "out of time"; empty: none
     """

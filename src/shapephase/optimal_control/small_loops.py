@@ -82,6 +82,9 @@ def small_loop(
     the eigenvector of its largest eigenvalue sigma span the plane of the loop. A circle of radius rho turns the body by
     pi rho^2 sigma; a small turn theta in a time T costs 2 pi theta / (sigma T), and no small loop turns it cheaper.
 
+    Equation :eq:`small-loop` of the documentation.
+    Source: Shapere and Wilczek, Gauge kinematics of deformable bodies, Am. J. Phys. 57 (1989) 514-518; Montgomery 1990.
+
     Parameters
     ----------
     shape : (n,) [rad or m]
@@ -94,11 +97,6 @@ def small_loop(
         For wrong shapes, an axis of no length, or if no small loop turns the body about the axis.
     SingularInertiaError
         See `extremal`.
-
-    Notes
-    -----
-    Equation :eq:`small-loop` of the documentation.
-    Source: Shapere and Wilczek, Gauge kinematics of deformable bodies, Am. J. Phys. 57 (1989) 514-518; Montgomery 1990.
 
     Examples
     --------

@@ -36,6 +36,8 @@ class SymbolicBody:
     numbers a DM. All are in base axes. Can be pickled, and each function has CasADi's own `serialize`. For numbers of
     many shapes at once the methods of `Body` are faster.
 
+    Source: Cabrera 2006, section 2.3 and equation (4); theory.md A3, A6, A7.
+
     Attributes
     ----------
     name : name of the body
@@ -49,10 +51,6 @@ class SymbolicBody:
         form T_0 - 1/2 L_o I^-1 L_o
     chain : its tree of links; None: particles
     maps : inertia, momentum_matrix, mass matrix and centre of mass of particles in one call; None: links
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 2.3 and equation (4); theory.md A3, A6, A7.
     """
 
     name: str

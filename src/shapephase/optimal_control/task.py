@@ -42,8 +42,6 @@ class Reorientation:
 
     A ball joint that moves has three: the axis of its turn from the start times the tangent of half the angle.
 
-    Attributes
-    ----------
     body : the body that turns
     target : (3, 3) attitude at the end, from the identity at the start; None: `pointing` determines it
     pointing : (2, 3) a unit axis of the base and the inertial direction that it has to have at the end; None: `target`

@@ -144,6 +144,8 @@ def undo(
     ends at rest, and keeps to limits that the motion exceeds. With momentum the body turns on while its joints move
     back: playing backwards does not undo, and a plan has to reach the first attitude at a given time.
 
+    Source: theory.md B2: the holonomy of a path run backwards is the inverse, whatever the pace.
+
     Parameters
     ----------
     motion : of an articulated body: `reconstruct`, or `motion_from_recording(...).motion`
@@ -159,10 +161,6 @@ def undo(
         For a motion without a body and a path: made of particles or functions, or loaded from a file; with wheels.
     PlanNotFound
         If no plan was found, and playing backwards does not undo within the limits.
-
-    Notes
-    -----
-    Source: theory.md B2: the holonomy of a path run backwards is the inverse, whatever the pace.
 
     Examples
     --------

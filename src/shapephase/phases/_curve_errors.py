@@ -75,8 +75,6 @@ class CurveErrors:
 
     Arrays whose first axis is 2 hold what finer steps do, then what the perturbed series does.
 
-    Attributes
-    ----------
     motion, curve : whose errors they are
     """
 

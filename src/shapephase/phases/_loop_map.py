@@ -27,8 +27,6 @@ TINY = float(np.finfo(float).tiny)  # keeps quotients defined
 class MomentumLoop:
     """A loop of shapes, sampled once for all evaluations of its map.
 
-    Attributes
-    ----------
     goal : tolerance [rad]
     """
 

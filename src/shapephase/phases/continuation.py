@@ -53,6 +53,8 @@ def continued_orbits(
     corrects it; a step is shortened until the correction is small against it. The branch ends at a fold, where two
     orbits meet (trace 2) and there are none beyond.
 
+    Source: theory.md section 2.
+
     Parameters
     ----------
     magnitudes : (K,) 0 or more, all growing or all falling [kg m^2/s]
@@ -72,10 +74,6 @@ def continued_orbits(
         comes back.
     AccuracyNotReached
         If errors grow so much along the loop that the tolerance cannot be met.
-
-    Notes
-    -----
-    Source: theory.md section 2.
 
     Examples
     --------

@@ -40,6 +40,8 @@ class ForcedSplit:
 
         phase = dynamic_phase - body_solid_angle + space_solid_angle (mod 2 pi).
 
+    Equation :eq:`forced-phase` of the documentation.
+
     Attributes
     ----------
     gauge : the frame that the momentum was seen from
@@ -55,10 +57,6 @@ class ForcedSplit:
     work, energy_change : of the torque, and of the kinetic energy; the joints did the difference; None where only the
         inertia is known, not the masses [J]
     is_loop : whether the shape is the same at the end
-
-    Notes
-    -----
-    Equation :eq:`forced-phase` of the documentation.
 
     Examples
     --------

@@ -21,6 +21,8 @@ from ..errors import ShapeError
 def momentum_generator(momentum: ArrayLike, attitude: ArrayLike) -> Array:
     """The vector field of rotations about mu at R: body angular velocities (..., 3), Pi/l [1].
 
+    Source: Cabrera 2006, section 3.2.1; theory.md D1.
+
     Parameters
     ----------
     momentum : (..., 3) mu, inertial axes, not zero [kg m^2/s]
@@ -30,10 +32,6 @@ def momentum_generator(momentum: ArrayLike, attitude: ArrayLike) -> Array:
     ------
     ShapeError
         If an argument is of a wrong shape or value; so do the other two functions.
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 3.2.1; theory.md D1.
 
     Examples
     --------
@@ -50,13 +48,11 @@ def momentum_connection(momentum: ArrayLike, attitude: ArrayLike, angular_veloci
 
     Along a motion, A is the rate of the dynamic phase; velocities with A = 0 are horizontal.
 
+    Source: Cabrera 2006 (11); theory.md D2. Other arguments and errors as `momentum_generator`.
+
     Parameters
     ----------
     angular_velocity : (..., 3) of R' = R hat(omega), body axes [rad/s]
-
-    Notes
-    -----
-    Source: Cabrera 2006 (11); theory.md D2. Other arguments and errors are those of `momentum_generator`.
 
     Examples
     --------
@@ -75,13 +71,11 @@ def momentum_curvature(momentum: ArrayLike, attitude: ArrayLike, first: ArrayLik
     It is dS/l^2 of the velocities Pi x first and Pi x second that they give the momentum in the body: the phase of a
     small loop is minus its solid angle.
 
+    Source: Cabrera 2006, section 3.2.1; theory.md D3. Other arguments and errors as `momentum_generator`.
+
     Parameters
     ----------
     first, second : (..., 3) body angular velocities [rad/s]
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 3.2.1; theory.md D3. Other arguments and errors are those of `momentum_generator`.
 
     Examples
     --------

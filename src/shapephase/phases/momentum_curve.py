@@ -49,8 +49,6 @@ class Displacements(NamedTuple):
 class CurvePieces:
     """Integrals along the curves of a batch of motions, piece by piece.
 
-    Attributes
-    ----------
     edges : (K + 1,) times between which the curve bends little and its integrals are right to rounding
     dynamic : (B, K) integral of omega . Pi/|Pi| over each piece [rad]
     slivers : (B, K) signed area between each piece's arc and its chord [sr]
@@ -75,8 +73,6 @@ class CurvePieces:
 class MomentumCurve(CurvePieces):
     """The directions of the body momentum of a batch of motions, seen from a gauge's frame.
 
-    Attributes
-    ----------
     motion : whose momentum it is
     lift : of the horizontal gauge, else None
     frames : U(t) and its rates of another gauge; None too: the deformation's own frame

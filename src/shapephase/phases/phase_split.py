@@ -55,6 +55,8 @@ class PhaseSplit:
 
         dynamical_rotation = momentum_rotation wheel_rotation always.
 
+    Equations :eq:`split`, :eq:`tilt` and, with wheels, :eq:`wheel-split` of the documentation.
+
     Attributes
     ----------
     gauge : the frame from which the momentum curve was seen
@@ -81,10 +83,6 @@ class PhaseSplit:
     has_phase : whether there is angular momentum; without it all phases are 0, R_D is R_W and R_M the identity
     has_wheels : whether wheels store momentum (`articulated(..., rotors=, rotor_speeds=)`)
     about : the motion that was split
-
-    Notes
-    -----
-    Equations :eq:`split`, :eq:`tilt` and, with wheels, :eq:`wheel-split` of the documentation.
 
     Examples
     --------

@@ -49,6 +49,10 @@ def split(
 ) -> PhaseSplit | ForcedSplit:
     """Split the rotation of a motion into shape holonomy and Montgomery phase.
 
+    For a `ForcedMotion` the result is a `ForcedSplit`, which also has the solid angle of the momentum in space.
+    Equations :eq:`split`, :eq:`closed-split` and :eq:`tilt` of the documentation.
+    Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
+
     Parameters
     ----------
     gauge : "horizontal", the frame that the shape motion alone would carry along (shape apart from momentum);
@@ -66,12 +70,6 @@ def split(
         through zero, where it has no direction.
     RunStopped
         If `progress` stopped it.
-
-    Notes
-    -----
-    For a `ForcedMotion` the result is a `ForcedSplit`, which also has the solid angle of the momentum in space.
-    Equations :eq:`split`, :eq:`closed-split` and :eq:`tilt` of the documentation.
-    Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
 
     Examples
     --------
@@ -209,17 +207,15 @@ def running_phases(
 ) -> RunningPhases:
     """Return all phases in time, ending in those of `split`.
 
+    Raises the errors of `split`, and UnknownNameError for another closing. Source: Cabrera 2006, equation (12);
+    theory.md D5, D9; numerics.md section 3 (branch).
+
     Parameters
     ----------
     t : times (...) [s]
     gauge : as for `split`
     closing : how the momentum's curve so far is closed: "start", by the great circle back to its start, which ends in
         the closing of `split`; "reference", by great circles to one fixed direction, without jumps
-
-    Notes
-    -----
-    Raises the errors of `split`, and UnknownNameError for another closing. Source: Cabrera 2006, equation (12);
-    theory.md D5, D9; numerics.md section 3 (branch).
 
     Examples
     --------
@@ -315,6 +311,8 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
 
     All areas are counted from one region that no arc enters, so the arcs add up to the whole, not only modulo 4 pi.
 
+    Raises also the errors of `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
+
     Parameters
     ----------
     times : (K + 1,) increasing [s]; for the loops of a repeated path, the multiples of its period
@@ -324,10 +322,6 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     ------
     ShapeError
         If the times do not increase.
-
-    Notes
-    -----
-    Raises also the errors of `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
 
     Examples
     --------
@@ -396,6 +390,9 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
 
     R(t) = exp(dynamic_phase(t) hat(mu)) Par(t): it turns at omega_h = Pi' x Pi / |Pi|^2 (gauge axes).
 
+    Equation :eq:`open-arc` of the documentation.
+    Raises the errors of `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
+
     Parameters
     ----------
     t : times (...) [s]
@@ -404,11 +401,6 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
     Returns
     -------
     batch + (..., 3, 3), of the gauge's frame; the attitude itself without momentum
-
-    Notes
-    -----
-    Equation :eq:`open-arc` of the documentation.
-    Raises the errors of `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
 
     Examples
     --------
@@ -435,14 +427,12 @@ def dynamic_phase_from_energy(motion: Motion) -> Array:
     The integral of 2 T - 2 T_0 + L_o . I^-1 L_o - I^-1 L_o . Pi over |Pi|, T the whole kinetic energy about the centre
     of mass and T_0 that of the shape motion alone: a check of `dynamic_phase` that sums over the links.
 
+    Source: Cabrera 2006, remark 3.7; theory.md D11.
+
     Raises
     ------
     GaugeError
         If the deformation is known by its inertia only.
-
-    Notes
-    -----
-    Source: Cabrera 2006, remark 3.7; theory.md D11.
 
     Examples
     --------

@@ -49,6 +49,8 @@ def momentum_returns(motion: Motion, gap: float = 0.1) -> Returns:
     of no angle is the period. Minima not deeper than the motion's error are none, so a steady turn has no returns;
     dips of less than about a thousandth of a radian in a smooth approach may be passed over.
 
+    Source: theory.md section 6 and D12.
+
     Parameters
     ----------
     gap : above 0, up to pi [rad]
@@ -57,10 +59,6 @@ def momentum_returns(motion: Motion, gap: float = 0.1) -> Returns:
     ------
     ShapeError
         If the motion is a batch or has no momentum.
-
-    Notes
-    -----
-    Source: theory.md section 6 and D12.
 
     Examples
     --------

@@ -136,6 +136,8 @@ def stroboscopic_map(
 ) -> ReturnMap:
     """The map u(0) -> u(T) of directions of the body momentum over one loop of shapes.
 
+    Source: theory.md section 2.
+
     Parameters
     ----------
     magnitude : of the angular momentum [kg m^2/s]; for 0 the map is the inverse of what the loop alone turns
@@ -148,10 +150,6 @@ def stroboscopic_map(
         If the shape does not close.
     ShapeError
         If a direction is zero.
-
-    Notes
-    -----
-    Source: theory.md section 2.
 
     Examples
     --------
@@ -189,6 +187,9 @@ def fixed_points(
     so much that `most_directions` do not resolve it, and where fixed points fill curves or the sphere (symmetric
     bodies; no holonomy and hardly any momentum): of those come points 0.3 rad apart or more, with index 0.
 
+    Equation :eq:`lefschetz` of the documentation.
+    Source: theory.md section 2, B9, D16.
+
     Parameters
     ----------
     magnitude : of the angular momentum, above 0 [kg m^2/s]
@@ -206,11 +207,6 @@ def fixed_points(
         If errors grow so much along the loop that the tolerance cannot be met.
     RunStopped
         If `progress` stopped it.
-
-    Notes
-    -----
-    Equation :eq:`lefschetz` of the documentation.
-    Source: theory.md section 2, B9, D16.
 
     Examples
     --------

@@ -25,8 +25,6 @@ _WIDTH = 88  # letters of a line, the width of the table
 def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> list[str]:
     """The table of a split; angles in degrees first, then in radians, with no more digits than their errors leave.
 
-    Parameters
-    ----------
     heading : the first line; without it what moved, for how long, with which momentum
     shape_gap : how far the shape is from its start in the end, with a unit; without it the number alone
     """

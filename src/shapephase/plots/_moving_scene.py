@@ -37,8 +37,6 @@ _PARTICLE_RADIUS = 0.06  # of the heaviest particle, over the largest distance f
 class MovingNode:
     """Shapes that move as one.
 
-    Attributes
-    ----------
     name : of the link, particle or inertia that carries them
     shapes : their poses are relative to the node
     poses : (F, 4, 4) of the node in base axes, one for each frame

@@ -21,8 +21,6 @@ _SAME_CORNER = 9  # decimals: a side that two cells share differs by rounding
 class AreaCells:
     """Small polygons that cover the inside of a curve once.
 
-    Attributes
-    ----------
     polygons : (m_k, 3) corners each, counterclockwise as seen from outside
     windings : (K,) winding number of the curve about each, counterclockwise positive; not zero, at most three
     """
@@ -44,8 +42,6 @@ def enclosed_cells(corners: Array, reference: Array) -> AreaCells:
     the point opposite `reference`, where the winding number is zero, each arc adds its sense; so the area is that of
     `sphere.polygon_area`, counted from that point.
 
-    Parameters
-    ----------
     corners : (N, 3) unit vectors, the last joined to the first
     reference : (3,) unit vector whose opposite is not on the curve
     """
@@ -76,8 +72,6 @@ def outlines(polygons: list[Array]) -> list[Array]:
 
     What is on the left of a polygon's sides is on the left of these, so that a hole is gone round the other way.
 
-    Parameters
-    ----------
     polygons : (m_k, d) corners each
     """
     corners = np.concatenate(polygons)

@@ -30,8 +30,6 @@ _LIMB = -1e-9  # [1] height over the limb's plane: rounding on the limb is on th
 class ParallelAxes:
     """Space in parallel projection, on flat axes, or on three-dimensional ones in the view they have.
 
-    Parameters
-    ----------
     ax : flat axes, or three-dimensional ones
     view : elevation and azimuth of the eye [degrees], for flat axes
     """
@@ -115,8 +113,6 @@ class ParallelAxes:
 class SphereAxes(ParallelAxes):
     """The unit sphere in parallel projection; what is on its far side is dimmed.
 
-    Parameters
-    ----------
     ax, view : as for `ParallelAxes`
     """
 
@@ -260,19 +256,8 @@ def _outward(place: Array) -> Array:
 
 
 def _hull(points: Array) -> Array:
-    """The convex hull of points of a plane, counterclockwise (Andrew 1979): (N, 2) -> (M, 2)."""
-    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
-    found: list[Array] = []
-    for run in (ordered, ordered[::-1]):
-        chain: list[Array] = []
-        for point in run:
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
-                chain.pop()
-            chain.append(point)
-        found += chain[:-1]
-    return np.array(found or [points[0]])
+    """The convex hull of points of a plane, counterclockwise: (N, 2) -> (M, 2)."""
+    from scipy.spatial import ConvexHull
 
-
-def _turn(start: Array, corner: Array, end: Array) -> float:
-    (a, b), (c, d) = corner - start, end - corner
-    return float(a * d - b * c)
+    # Joggled, so that points on one line have one, too.
+    return points[ConvexHull(points, qhull_options="QJ").vertices]

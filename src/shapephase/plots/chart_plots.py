@@ -50,6 +50,8 @@ def plot_euler_angles(
 ) -> Axes:
     """Inertial and body axes, the line of nodes where their horizontal planes meet, and the three angles as arcs.
 
+    Source: Marsden and Ratiu, figure 15.6.1; theory.md J1.
+
     Parameters
     ----------
     ax : flat axes, drawn on in parallel projection, or three-dimensional ones, in the view they have
@@ -61,10 +63,6 @@ def plot_euler_angles(
     ------
     ChartPoleError
         If theta is a multiple of pi, where both planes are one and there is no line of nodes.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, figure 15.6.1; theory.md J1.
 
     Examples
     --------
@@ -121,6 +119,8 @@ def plot_elliptic_cylinders(ax: Axes, top: EulerTop, *, view: tuple[float, float
     K = (E - |Pi|^2/(2 I_3)), whose cylinder is about axis 3, and N, a combination of energy and momentum without Pi_1,
     whose cylinder is about axis 1. On the first, the motion is that of a pendulum: see `plot_pendulum`.
 
+    Source: Marsden and Ratiu (15.11.6) to (15.11.11); theory.md N2 to N4.
+
     Parameters
     ----------
     ax : flat axes, drawn on in parallel projection, or three-dimensional ones, in the view they have
@@ -131,10 +131,6 @@ def plot_elliptic_cylinders(ax: Axes, top: EulerTop, *, view: tuple[float, float
     ------
     ShapeError
         If two moments are equal, or one of the cylinders is a line.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.11.6) to (15.11.11); theory.md N2 to N4.
 
     Examples
     --------
@@ -188,6 +184,8 @@ def plot_pendulum(ax: Axes, top: EulerTop) -> Axes:
     Curves of equal N: librations about the axis of the smallest moment, rotations about that of the largest, and the
     separatrix through the middle one; the top's own is thick, with a star at its start.
 
+    Source: Marsden and Ratiu (15.11.12), (15.11.13), proposition 15.11.1; theory.md N5 to N8.
+
     Parameters
     ----------
     ax : flat axes
@@ -197,10 +195,6 @@ def plot_pendulum(ax: Axes, top: EulerTop) -> Axes:
     ------
     ShapeError
         If two moments are equal, or the momentum is along axis 3, where the angle is undefined.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.11.12), (15.11.13), proposition 15.11.1; theory.md N5 to N8.
 
     Examples
     --------

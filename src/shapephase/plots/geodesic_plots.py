@@ -48,6 +48,8 @@ def plot_conjugate_locus(
     the largest moment, towards the asymptotes phi = -K/alpha and K/alpha; faint the geodesics from the point up to
     where they touch it.
 
+    Source: Bonnard, Cots and Shcherbakova 2013, section 4.4; theory.md R12.
+
     Parameters
     ----------
     ax : flat axes
@@ -61,10 +63,6 @@ def plot_conjugate_locus(
     ------
     ShapeError
         If a momentum is not above the root of the middle moment.
-
-    Notes
-    -----
-    Source: Bonnard, Cots and Shcherbakova 2013, section 4.4; theory.md R12.
 
     Examples
     --------
@@ -125,6 +123,8 @@ def plot_surface_locus(
     for even ones; faint the geodesics on their way past the first. The ordinate is the parametric latitude, whose
     cosine is the distance from the axis over the equator's. The cut locus is drawn with order 1, where it is known.
 
+    Source: Bonnard, Cots and Shcherbakova 2013, section 2; theory.md O16, P3, P5, P6.
+
     Parameters
     ----------
     ax : flat axes
@@ -137,10 +137,6 @@ def plot_surface_locus(
     ------
     ShapeError
         For a sphere, or if there are no orders.
-
-    Notes
-    -----
-    Source: Bonnard, Cots and Shcherbakova 2013, section 2; theory.md O16, P3, P5, P6.
 
     Examples
     --------
@@ -187,6 +183,8 @@ def plot_potential(ax: Axes, surface: SurfaceOfRevolution | ArrayLike, momenta: 
 
     Along an extremal of unit speed phi'^2 + V = 1; one that reaches the top of V below 1 passes the surface's end.
 
+    Source: Bonnard, Cots and Shcherbakova 2013, remark 1 and lemma 4.1; theory.md O2, R5.
+
     Parameters
     ----------
     ax : flat axes
@@ -197,10 +195,6 @@ def plot_potential(ax: Axes, surface: SurfaceOfRevolution | ArrayLike, momenta: 
     ------
     ShapeError
         If a momentum is larger than that of the equator.
-
-    Notes
-    -----
-    Source: Bonnard, Cots and Shcherbakova 2013, remark 1 and lemma 4.1; theory.md O2, R5.
 
     Examples
     --------
@@ -241,15 +235,13 @@ def plot_first_return(ax: Axes, surface: SurfaceOfRevolution | ArrayLike, moment
     T is the length after which an extremal comes back to its latitude and direction, R the longitude that it gains from
     one passage of the equator to the next; T' = 2 p R', so that both fall or rise together.
 
+    Source: Bonnard, Cots and Shcherbakova 2013, definition 2.4, lemma 2.8; theory.md O8, O14, R11.
+
     Parameters
     ----------
     ax : flat axes; a twin of them is added to their figure
     surface : a surface of revolution; or (3,) three different moments [kg m^2], of whose Serret-Andoyer metric
     momenta : (N,) p > 0 that are marked, of extremals that oscillate
-
-    Notes
-    -----
-    Source: Bonnard, Cots and Shcherbakova 2013, definition 2.4, lemma 2.8; theory.md O8, O14, R11.
 
     Examples
     --------
@@ -292,6 +284,8 @@ def plot_caustic(
     A rotation vector [rad] is axis times angle; on the sphere of radius pi opposite points are the same rotation, where
     a surface that leaves there continues on the opposite side. The grid has the axis of the largest moment as its pole.
 
+    Source: Bates and Fasso 2007, for two equal moments; theory.md Q6.
+
     Parameters
     ----------
     ax : three-dimensional axes
@@ -304,10 +298,6 @@ def plot_caustic(
     ------
     MissingExtraError, ShapeError, AccuracyNotReached
         Without Matplotlib; for moments or an order for which there are no conjugate points, or none are found.
-
-    Notes
-    -----
-    Source: Bates and Fasso 2007, for two equal moments; theory.md Q6.
 
     Examples
     --------

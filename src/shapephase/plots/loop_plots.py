@@ -65,8 +65,6 @@ class LoopFlux:
     Rotation vectors (3,) [rad] in base axes at the start; a flux is the turn that it stands for: minus the integral of
     the curvature over the cone of straight rays from the mean shape of the loop.
 
-    Attributes
-    ----------
     joints, units : of the two or three axes of the figure
     centre, directions : (n,) mean shape, (k, n) of the axes
     points : (N, k) the loop in the figure
@@ -145,6 +143,8 @@ def plot_loop(
     one turns the body about the axis, what goes across one does not. The postures are those at the numbers on the
     loop, with the turn up to there.
 
+    Source: theory.md B6; Hatton and Choset 2011.
+
     Parameters
     ----------
     ax : flat axes; three-dimensional ones for three joints
@@ -160,10 +160,6 @@ def plot_loop(
         If the path does not close.
     ShapeError, UnknownNameError
         For other joints, fewer than two that move, or those of a ball joint.
-
-    Notes
-    -----
-    Source: theory.md B6; Hatton and Choset 2011.
 
     Examples
     --------

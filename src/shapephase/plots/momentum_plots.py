@@ -71,6 +71,8 @@ def plot_momentum_curve(
     number, and hatched where the curve is clockwise, which counts as negative. Behind are the polhodes, separatrices
     and axes of the rigid body with the inertia of one time, in the same frame. The far side is dimmed.
 
+    Source: Cabrera 2006, equation (12) and section 4.1; Marsden and Ratiu, figure 15.3.1.
+
     Parameters
     ----------
     ax : flat axes, drawn on in parallel projection, or three-dimensional ones, in the view they have
@@ -86,10 +88,6 @@ def plot_momentum_curve(
         Without Matplotlib; for a gauge that `split` refuses.
     ShapeError
         If the motion is a batch, or has no momentum.
-
-    Notes
-    -----
-    Source: Cabrera 2006, equation (12) and section 4.1; Marsden and Ratiu, figure 15.3.1.
 
     Examples
     --------

@@ -232,6 +232,8 @@ def plot_energy(
     farthest of these three would press the energy into a small part of the axis, the axis ends before it, and the
     legend has its end.
 
+    Source: Cabrera 2006, section 4.1.1; theory.md E1, E5.
+
     Parameters
     ----------
     ax : flat axes
@@ -243,10 +245,6 @@ def plot_energy(
     ------
     ShapeError
         If the motion is a batch, or has no momentum.
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 4.1.1; theory.md E1, E5.
 
     Examples
     --------

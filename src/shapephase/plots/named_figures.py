@@ -273,8 +273,6 @@ def write_figure(
 def write_rigid_figure(kind: str, top: EulerTop, out: str | os.PathLike[str], time: float = 0.0) -> None:
     """Write one of `RIGID_FIGURES` to an .svg, .pdf or .png file, whole or not at all.
 
-    Parameters
-    ----------
     time : at which the ellipsoid or the cones are shown [s]
     """
     check_choice(kind, "kind of figure", RIGID_FIGURES)

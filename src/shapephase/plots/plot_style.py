@@ -74,6 +74,9 @@ _MAX_VECTOR_POINTS = 10_000  # ten in each dot of a column's width; longer curve
 def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     """Axes of a new figure one column wide (3.4 in) that leaves room for labels and legend by itself.
 
+    The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it. Lines that are
+    drawn there without a colour have those of Okabe and Ito.
+
     Parameters
     ----------
     height : [in]
@@ -85,11 +88,6 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
         If the height is not above 0.
     MissingExtraError
         If Matplotlib is not installed.
-
-    Notes
-    -----
-    The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it. Lines that are
-    drawn there without a colour have those of Okabe and Ito.
 
     Examples
     --------
@@ -375,8 +373,6 @@ def ticks_in_degrees(axis: Any) -> None:
 def inset_where_free(ax: Any, extent: tuple[float, float], room: tuple[float, float, float]) -> Any | None:
     """Axes in a corner of others over which none of their lines passes; None if there is no such corner.
 
-    Parameters
-    ----------
     extent : width and height [widths and heights of the axes]
     room : to the left of them, below and above them, for what is written there [the same]
     """

@@ -45,6 +45,8 @@ def plot_polhodes(
 ) -> Axes:
     """Polhodes, separatrices and equilibria on the sphere of unit momentum; the far side is dimmed.
 
+    Source: Marsden and Ratiu, figure 15.3.1.
+
     Parameters
     ----------
     ax : flat axes, drawn on in parallel projection, or three-dimensional ones, in the view they have
@@ -52,10 +54,6 @@ def plot_polhodes(
         polhode is drawn thick, with a star at its start
     energies : (N,) of the curves for |Pi| = 1 [1/(kg m^2)]; None: four about each stable axis
     view : elevation and azimuth of the eye [degrees], for flat axes
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, figure 15.3.1.
 
     Examples
     --------
@@ -103,6 +101,8 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
     The origin is the foot of the normal, which points to the eye; the first axis points to the curve at t = 0, marked
     by a star. On the separatrix the whole spiral is drawn, whatever the periods; a steady rotation is a point.
 
+    Source: Marsden and Ratiu, section 15.5; theory.md I5.
+
     Parameters
     ----------
     ax : flat axes
@@ -112,10 +112,6 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
     ------
     ShapeError
         If the number of periods is not above 0, or the top has no momentum.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, section 15.5; theory.md I5.
 
     Examples
     --------
@@ -157,6 +153,8 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
     are double for every Pi3; beyond the threshold they are imaginary there as elsewhere. No top with weight reaches
     that line, since I1 is taken about the point of support: I3 < 2 I1.
 
+    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M6 for equality, M-E10 for the spectrum.
+
     Parameters
     ----------
     ax : flat axes
@@ -167,10 +165,6 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
     ------
     MissingExtraError, ShapeError, SingularInertiaError
         For a ratio of moments that is not above 0.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M6 for equality, M-E10 for the spectrum.
 
     Examples
     --------

@@ -34,16 +34,14 @@ def plot_crown(
 ) -> Axes:
     """The crown region on the sphere of unit momentum, in which Pi is certain to stay, and a motion inside it.
 
+    Source: Cabrera 2006, section 4.1; theory.md E8.
+
     Parameters
     ----------
     ax : flat axes, drawn on in parallel projection
     crown : from `crown_region`
     motion : of one momentum, no batch; drawn over the certificate's interval
     view : elevation and azimuth of the eye [degrees]; None: beside the certificate's axis
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 4.1; theory.md E8.
 
     Examples
     --------

@@ -49,6 +49,8 @@ def plot_rolling_ellipsoid(
     Lengths are angular velocities. The plane is drawn as a floor, so that the momentum points down; the first axis
     points along the herpolhode's point at t = 0. What the ellipsoid hides is dimmed.
 
+    Source: Marsden and Ratiu, section 15.5; theory.md I1 to I5.
+
     Parameters
     ----------
     ax : flat axes, drawn on in parallel projection, or three-dimensional ones, in the view they have
@@ -61,10 +63,6 @@ def plot_rolling_ellipsoid(
     ------
     ShapeError
         If the top has no momentum, or the number of periods is not above 0.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, section 15.5; theory.md I1 to I5.
 
     Examples
     --------
@@ -117,6 +115,8 @@ def plot_cones(ax: Axes, top: EulerTop, time: float = 0.0, *, view: tuple[float,
     Lengths are angular velocities; the momentum points up, and the first axis to where the angular velocity is at
     t = 0. The body cone is about the axis of symmetry, the space cone about the momentum.
 
+    Source: Marsden and Ratiu, 15.8 case 2; theory.md H2.
+
     Parameters
     ----------
     ax : flat axes, drawn on in parallel projection, or three-dimensional ones, in the view they have
@@ -128,10 +128,6 @@ def plot_cones(ax: Axes, top: EulerTop, time: float = 0.0, *, view: tuple[float,
     ------
     ShapeError
         If no two moments are equal, or all three, or the momentum is zero.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, 15.8 case 2; theory.md H2.
 
     Examples
     --------

@@ -70,14 +70,9 @@ class MotionViews:
         that passes through gimbal lock, to 1e-10 rad or the attitude's error estimate, continues straight: the middle
         angle goes on beyond its end.
 
-        Parameters
-        ----------
-        sequence : three of X, Y, Z, or of x, y, z, no two neighbours alike; "ZYX" is yaw, pitch, roll
+        Raises UnknownNameError for another sequence.
 
-        Raises
-        ------
-        UnknownNameError
-            For another sequence.
+        sequence : three of X, Y, Z, or of x, y, z, no two neighbours alike; "ZYX" is yaw, pitch, roll
         """
         return self._continued(t, euler_chart(sequence))
 
@@ -136,6 +131,8 @@ class MotionViews:
         and the tilt about the frontal axis between them. Somersault and twist begin within half a turn, and all are
         continuous in time; divided by 2 pi they are revolutions.
 
+        Source: Yeadon 1990, J. Biomech. 23, 59: angles in the order somersault, tilt, twist.
+
         Parameters
         ----------
         lateral, longitudinal, somersault, up : as for `athlete_axes`
@@ -144,10 +141,6 @@ class MotionViews:
         ------
         UnknownNameError, ShapeError, WrongObjectError
             For the axes that `athlete_axes` refuses.
-
-        Notes
-        -----
-        Source: Yeadon 1990, J. Biomech. 23, 59: angles in the order somersault, tilt, twist.
 
         Examples
         --------
@@ -252,15 +245,10 @@ class MotionViews:
     def write_csv(self: Any, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike) -> None:
         """Write a time series: attitude (x y z w, one sign throughout), angular velocity, base position.
 
-        Parameters
-        ----------
+        Raises ShapeError if the motion is a batch.
+
         times : (N,) [s]; None: 201 even times
         fall : start, velocity, gravity as in `base_position`
-
-        Raises
-        ------
-        ShapeError
-            If the motion is a batch.
         """
         check_keywords(fall, MotionViews.write_csv)
         write_table(path, self._columns(times, fall))
@@ -341,8 +329,6 @@ class MotionViews:
     def view(self: Any, **options: Any) -> Any:
         """Return a page of the motion in three dimensions, to write, show or film; a notebook displays it.
 
-        Parameters
-        ----------
         options : of `shapephase.view`
         """
         return offered("Motion.view")(self, **options)

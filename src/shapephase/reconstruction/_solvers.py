@@ -47,8 +47,6 @@ class Solution(Protocol):
 class Dop853Rotation:
     """Attitude relative to the start by SciPy's integrator, for a batch.
 
-    Attributes
-    ----------
     turns : one for each motion of the batch
     times : (K + 1,) ends of the steps of all [s]
     """

@@ -49,8 +49,6 @@ def continued_angles(
     The motion is followed from its start at times of its own, so the coordinates do not depend on the requested times.
     A motion that passes through a pole, to 1e-10 rad or the attitude's uncertainty, continues straight.
 
-    Parameters
-    ----------
     quaternions_at : times (M,) -> (B, M, 4), of any sign
     curve : by `followed`, with this chart and uncertainty
     uncertainty : estimated error of the attitudes [rad]
@@ -72,8 +70,6 @@ def followed(
 
     (M,) [s], (B, M, 4)
 
-    Parameters
-    ----------
     known : (K,) times between which attitudes move smoothly and by far less than a turn, first 0, last the end [s]
     """
     at_pole = max(_AT_POLE, uncertainty)
@@ -130,8 +126,6 @@ class EulerAngles:
     Their moduli are cosine and sine of half the middle angle, increased by a right angle where all axes differ.
     Source: Bernardes and Viollet 2022, PLoS ONE 17, e0276302.
 
-    Attributes
-    ----------
     sequence : as for `Motion.euler_angles`
     """
 
@@ -193,8 +187,6 @@ def _directions(vectors: Array, at_pole: float) -> Array:
 def euler_angles(attitudes: Array, sequence: str) -> Array:
     """Return Euler angles of consecutive attitudes, continuous in time: (N, 3, 3) -> (N, 3) [rad].
 
-    Parameters
-    ----------
     sequence : as for `Motion.euler_angles`
     """
     return EulerAngles(sequence).numbers(continuous(so3.quat_from_matrix(attitudes)), _AT_POLE)

@@ -440,6 +440,9 @@ def reconstruct(
 
     Solves R' = R hat(I^-1 (R^T momentum - L_o)); with an external torque the momentum changes by R torque, too.
 
+    Equations :eq:`reconstruction`, :eq:`euler` and :eq:`external-torque` of the documentation.
+    Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
+
     Parameters
     ----------
     deformation : one, or those of a family of N bodies, each computed as if it were alone
@@ -470,11 +473,6 @@ def reconstruct(
         If `progress` stopped the run.
     WrongObjectError
         If no momentum is given.
-
-    Notes
-    -----
-    Equations :eq:`reconstruction`, :eq:`euler` and :eq:`external-torque` of the documentation.
-    Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
 
     Examples
     --------
@@ -579,6 +577,8 @@ def momentum_from_rate(
 ) -> Array:
     """Return the angular momentum of a body whose base has this angular velocity at one time while its shape moves.
 
+    Source: Cabrera 2006, equation (7).
+
     Parameters
     ----------
     deformation : one, or, at the start, those of a family of N bodies, where leading axes are () or (N,)
@@ -596,10 +596,6 @@ def momentum_from_rate(
         For arrays of the wrong shape, or a family at a later time.
     TrajectoryError
         For a time outside the motion.
-
-    Notes
-    -----
-    Source: Cabrera 2006, equation (7).
 
     Examples
     --------

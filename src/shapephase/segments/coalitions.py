@@ -29,6 +29,8 @@ def shapley_values(values: ArrayLike) -> Array:
 
     The share of a member is the change of the function when it joins, averaged over all orders in which members join.
 
+    Source: Shapley 1953, A value for n-person games.
+
     Parameters
     ----------
     values : (..., 2^k) of all subsets; member i is in subset m where bit i of m is set
@@ -42,10 +44,6 @@ def shapley_values(values: ArrayLike) -> Array:
     ShapeError
         If the number of values is not a power of two.
 
-    Notes
-    -----
-    Source: Shapley 1953, A value for n-person games.
-
     Examples
     --------
     >>> sp.segments.shapley_values([0.0, 1.0, 0.0, 3.0]).tolist()  # alone the first does 1, both together 3
@@ -57,6 +55,8 @@ def shapley_values(values: ArrayLike) -> Array:
 
 def shapley_interactions(values: ArrayLike) -> Array:
     """Return Shapley-Taylor interactions of order two: what each member does alone, and each pair beyond that.
+
+    Source: Dhamdhere, Agarwal and Sundararajan 2020, The Shapley Taylor interaction index.
 
     Parameters
     ----------
@@ -70,10 +70,6 @@ def shapley_interactions(values: ArrayLike) -> Array:
     ------
     ShapeError
         If the number of values is not a power of two.
-
-    Notes
-    -----
-    Source: Dhamdhere, Agarwal and Sundararajan 2020, The Shapley Taylor interaction index.
 
     Examples
     --------

@@ -46,8 +46,6 @@ _PARTS = 8  # of a step, at which angles of a link other than the base are conti
 class LinkChart:
     """Somersault, tilt and twist of one link of a body, Rotation = there Ry(somersault) Rx(tilt) Rz(twist) here^T.
 
-    Attributes
-    ----------
     link : name of the link, or "base"
     frame, pose : number of its frame in the chain and its axes there; of the base 0 and the identity
     here : (3, 3) columns to the front, to the left and up the body, axes of the link
@@ -215,8 +213,6 @@ class DirectShares:
 class DirectRates:
     """Rates of an angle by source along a motion.
 
-    Attributes
-    ----------
     motion, chart : of the link
     of : one of `ANGLES`, or "rotation" about the inertial axis `about`
     joints : columns of the shape by joint
@@ -275,10 +271,7 @@ class DirectRates:
 def direct_shares(rates: DirectRates, times: Array, at: float) -> DirectShares:
     """Return the integrals of the rates of an angle up to times (N,), and to one of them for which totals are stated.
 
-    Raises
-    ------
-    ChartPoleError
-        If the tilt of the link passes 85 degrees, where somersault and twist have no meaning.
+    Raises ChartPoleError if the tilt of the link passes 85 degrees, where somersault and twist have no meaning.
     """
     motion = rates.motion
     edges = np.union1d(motion.solution.times, motion.deformation.breaks)

@@ -62,8 +62,6 @@ class _Mixed:
 class HeldMotions:
     """The motion, and what it would be with groups held.
 
-    Parameters
-    ----------
     motion : along a path of joints
     columns : of the shape, by name of the group
     baseline : "first" or "neutral" posture, a shape, or another motion

@@ -289,6 +289,8 @@ def contributions(
     group alone off it. *Shared*: Shapley values, which average what a group adds over all orders in which groups join;
     they add up to the whole. They answer different questions, and none says what an athlete did on purpose.
 
+    Source: Yeadon 1993 (simulations with techniques taken out); Shapley 1953; docs/howto/contributions.md.
+
     Parameters
     ----------
     motion : made by `reconstruct` of `articulated(body, path)`
@@ -316,10 +318,6 @@ def contributions(
         for errors beside a result or a baseline without bars, and as `uncertainty` raises.
     ChartPoleError
         If the tilt of the motion passes 85 degrees and `of` is one of the three angles.
-
-    Notes
-    -----
-    Source: Yeadon 1993 (simulations with techniques taken out); Shapley 1953; docs/howto/contributions.md.
 
     Examples
     --------

@@ -44,8 +44,6 @@ _END = re.compile(r"(?i)(?<![a-z])(front|rear|fore|hind)(?![a-z])")
 class Limb:
     """Joints that move together, with the names by which it is paired with another.
 
-    Attributes
-    ----------
     joints : names of the joints, as in `SegmentTree.joints`
     kind, side, end : "arm", "left" or "right", "front" or "rear"; "" where unknown
     mass : [kg]

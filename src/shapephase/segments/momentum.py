@@ -239,6 +239,8 @@ def segment_momentum(
     attitudes and joints, or as recorded, and bars hold the noise of the samples. The whole of a `Motion` is its
     momentum at all times, and bars hold its numerical error.
 
+    Bars of a recording take its noise to be white, and the body's masses to be right.
+
     Parameters
     ----------
     motion : a single `Motion` of a body with joints, a `RecordedMotion` with its base, or a `FloatingTrajectory`
@@ -268,10 +270,6 @@ def segment_momentum(
     -----
     TrajectoryWarning
         For a recording that was low-pass filtered, without `attitude_noise`.
-
-    Notes
-    -----
-    Bars of a recording take its noise to be white, and the body's masses to be right.
 
     Examples
     --------

@@ -31,6 +31,9 @@ def mechanical_connection(body: Body | ParticleBody | str, shape: ArrayLike, *, 
 
     A(r) = I(r)^-1 J(r): with zero momentum the base turns at omega = -A(r) rate [rad/s, base axes].
 
+    Equation :eq:`connection` of the documentation, for ball joints with :eq:`ball-rates`.
+    Source: Cabrera 2006, sections 2.1 and 2.3.1 (a); theory.md B1.
+
     Parameters
     ----------
     shape : (..., n) joint coordinates [rad or m]
@@ -45,11 +48,6 @@ def mechanical_connection(body: Body | ParticleBody | str, shape: ArrayLike, *, 
     ------
     ShapeError
         If the last axis is not the body's n joints, or an entry is not finite.
-
-    Notes
-    -----
-    Equation :eq:`connection` of the documentation, for ball joints with :eq:`ball-rates`.
-    Source: Cabrera 2006, sections 2.1 and 2.3.1 (a); theory.md B1.
 
     Examples
     --------
@@ -77,6 +75,9 @@ def curvature(body: Body | ParticleBody | str, shape: ArrayLike, *, of: str = "c
     For rates, e_a the directions in which one of them is 1, it is F(e_a, e_b) = e_a(A_b) - e_b(A_a) - A([e_a, e_b])
     - A_a x A_b: those of a ball joint do not commute, [e_x, e_y] = e_z and so on.
 
+    Equation :eq:`curvature` of the documentation; of rates :eq:`ball-curvature`.
+    Raises like `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
+
     Parameters
     ----------
     shape, of : as for `mechanical_connection`
@@ -84,11 +85,6 @@ def curvature(body: Body | ParticleBody | str, shape: ArrayLike, *, of: str = "c
     Returns
     -------
     (..., n, n, 3) antisymmetric in i, j; base axes [rad per product of the two joints' units]; (..., m, m, 3) of rates
-
-    Notes
-    -----
-    Equation :eq:`curvature` of the documentation; of rates :eq:`ball-curvature`.
-    Raises like `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
 
     Examples
     --------
@@ -127,6 +123,9 @@ def connection_slopes(body: Body | ParticleBody | str, shape: ArrayLike) -> tupl
 def holonomy(body: Body | ParticleBody | str, path: ShapePath | str, tolerance: float = 1e-9) -> Array:
     """The rotation of a body with zero angular momentum whose joints go once round a loop.
 
+    Equation :eq:`holonomy` of the documentation.
+    Source: Cabrera 2006, section 3.1.1 (R_G); theory.md B7.
+
     Parameters
     ----------
     path : a closed path; a continuous joint may end whole turns from its start
@@ -140,11 +139,6 @@ def holonomy(body: Body | ParticleBody | str, path: ShapePath | str, tolerance: 
     ------
     OpenPathError
         If the path does not close: then the rotation depends on where the base frame is fixed.
-
-    Notes
-    -----
-    Equation :eq:`holonomy` of the documentation.
-    Source: Cabrera 2006, section 3.1.1 (R_G); theory.md B7.
 
     Examples
     --------
@@ -204,6 +198,8 @@ class HorizontalLift:
 def horizontal_lift(body: Body | ParticleBody | str, path: ShapePath | str, tolerance: float = 1e-9) -> HorizontalLift:
     """The attitude of a body with zero angular momentum along a path, open or closed: R' = R hat(-A rate), R(0) = 1.
 
+    Source: Cabrera 2006, section 2.3.1 (a) and remark 2.11; theory.md B2, B8.
+
     Parameters
     ----------
     path : any path of the body's joints
@@ -215,10 +211,6 @@ def horizontal_lift(body: Body | ParticleBody | str, path: ShapePath | str, tole
         If the path has other joints than the body.
     AccuracyNotReached
         If the tolerance cannot be met.
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 2.3.1 (a) and remark 2.11; theory.md B2, B8.
 
     Examples
     --------
@@ -248,6 +240,8 @@ def holonomy_derivative(
     d_k is the integral of the curvature F(rate, variation_k), carried along by the lift, plus what moving the loop's
     own start does.
 
+    Source: theory.md B6; numerics.md section 4 (curvature of the connection).
+
     Parameters
     ----------
     path : a closed path, as for `holonomy`
@@ -268,10 +262,6 @@ def holonomy_derivative(
         If `variation` returns another shape, or what is not finite.
     AccuracyNotReached
         If the tolerance cannot be met.
-
-    Notes
-    -----
-    Source: theory.md B6; numerics.md section 4 (curvature of the connection).
 
     Examples
     --------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +14,7 @@ from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
+from ..chebyshev import gauss_tableau
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
@@ -38,6 +38,8 @@ _SHARE = 0.01  # of the tolerance for each ray: the sum over the path then keeps
 def is_flat(body: Body | ParticleBody | str, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
     """True where the curvature vanishes, so that small loops of the joints do not turn the body.
 
+    Source: theory.md B6.
+
     Parameters
     ----------
     shapes : (..., n) to be examined [rad or m]; None: 16 random shapes, always the same, spread over the joint
@@ -50,10 +52,6 @@ def is_flat(body: Body | ParticleBody | str, shapes: ArrayLike | None = None, to
     ------
     ShapeError
         If the last axis is not the body's n joints, there are no shapes, or the tolerance is not above 0.
-
-    Notes
-    -----
-    Source: theory.md B6.
 
     Examples
     --------
@@ -84,6 +82,8 @@ def curvature_on_plane(
 ) -> Array:
     """Curvature F_ij over the plane of two joints.
 
+    Source: theory.md B6; numerics.md section 4.
+
     Parameters
     ----------
     joints : the joints i and j, names or places in the shape vector
@@ -101,10 +101,6 @@ def curvature_on_plane(
         If a name is not one of the body's joints.
     ShapeError
         If the joints are not two different ones, or an array has the wrong shape.
-
-    Notes
-    -----
-    Source: theory.md B6; numerics.md section 4.
 
     Examples
     --------
@@ -145,6 +141,8 @@ def stokes_holonomy(
     changes them by less than a hundredth of the tolerance; a(t) is then sampled and its ordered exponential stepped
     by the integrator of `holonomy`, whose error estimate has to stay within the rest of the tolerance.
 
+    Source: theory.md B6, B7.
+
     Parameters
     ----------
     path : a closed path; it may have corners, cross itself and pass through the centre
@@ -164,10 +162,6 @@ def stokes_holonomy(
         If at the centre or at another shape of the cone all mass is on one line: there the connection is not defined.
     AccuracyNotReached
         If the tolerance cannot be met, as where the cone passes close to such a shape.
-
-    Notes
-    -----
-    Source: theory.md B6, B7.
 
     Examples
     --------
@@ -256,7 +250,7 @@ class _Cone:
 
     def _on_pieces(self, pieces: int, times: Array, arms: Array, rates: Array) -> tuple[Array, Array, Array]:
         """a(t), T(1, t), and the magnitude of the terms of a(t), with 12 nodes on each piece of the rays."""
-        nodes, weights, integrals = _collocation()
+        nodes, weights, integrals = gauss_tableau(_NODES)
         along = ((np.arange(pieces)[:, None] + nodes) / pieces).ravel()
         shapes = self._centre + along[:, None] * arms[:, None]
         directions, changes = np.broadcast_arrays(arms[:, None], rates[:, None] * along[:, None])
@@ -300,16 +294,6 @@ def curvature_along(
     bracket = np.cross(turn_first, turn_second)
     norms = np.linalg.norm(np.stack([onward, sideways, bracket]), axis=-1)
     return onward - sideways - bracket, turn_first, norms.sum(axis=0)
-
-
-@lru_cache(maxsize=1)
-def _collocation() -> tuple[Array, Array, Array]:
-    """Gauss nodes and weights of [0, 1], and the integrals from 0 to each node of the polynomials through them."""
-    legendre = np.polynomial.legendre
-    nodes, weights = legendre.leggauss(_NODES)
-    coefficients = (legendre.legvander(nodes, _NODES - 1) * weights[:, None]).T * (np.arange(_NODES)[:, None] + 0.5)
-    integrals = legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T
-    return 0.5 * (nodes + 1.0), 0.5 * weights, np.asarray(0.5 * integrals, dtype=np.float64)
 
 
 def _random_shapes(body: Body | ParticleBody) -> Array:

@@ -40,8 +40,6 @@ class LinearSmoother:
     order : of the derivative that is penalized
     digital : True if K is that of the Butterworth filter, else it is that of the spline
 
-    Notes
-    -----
     Source: Reinsch 1967; Wahba 1990, Spline Models for Observational Data, section 1.3; Pollock 2000, Journal of
     Econometrics 99, 317 (the filter of a finite stretch).
     """
@@ -95,8 +93,6 @@ class LowPass:
     cut_off : at which both passes together leave 1/sqrt(2) of an amplitude [Hz]
     rate : samples a second [Hz]
 
-    Notes
-    -----
     Both passes leave 1/(1 + (sqrt(2) - 1) (tan(pi f/rate)/tan(pi cut_off/rate))^4). Source: Winter 2009, Biomechanics
     and Motor Control of Human Movement, section 3.4.4.2.
     """
@@ -140,8 +136,6 @@ def likeliest(
     values, noise : (count, n), (n,) [rad or m]; a column without noise is left as it is
     groups : columns that have one penalty together
 
-    Notes
-    -----
     Source: Wahba 1985, Annals of Statistics 13, 1378 (generalized maximum likelihood).
     """
     system = _Roughness(times, periodic, order)

@@ -69,6 +69,9 @@ def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = 
 
     The bars of a smoothed recording hold the noise that is left and the bias of smoothing.
 
+    Source: own derivation; the bias is that of the quintic smoothing spline on the motion that one of degree nine sees
+    in the same samples.
+
     Parameters
     ----------
     path : through samples: `ShapePath.spline`, `ShapePath.waypoints`, or a recorded motion
@@ -84,11 +87,6 @@ def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = 
         For a noise of another length, or below zero.
     TrajectoryError
         For times outside of the path.
-
-    Notes
-    -----
-    Source: own derivation; the bias is that of the quintic smoothing spline on the motion that one of degree nine sees
-    in the same samples.
 
     Examples
     --------

@@ -81,10 +81,7 @@ def function_digests(name: str, function: Callable[..., Any]) -> dict[str, str]:
     These are its code, defaults, closure, arguments of `functools.partial`, the globals that it names and the files of
     the user's modules that it comes from or calls; packages that are installed are known by their versions.
 
-    Raises
-    ------
-    StudyError
-        For an object without comparable content, such as an open file.
+    Raises StudyError for an object without comparable content, such as an open file.
     """
     inputs = _Inputs(name)
     return {name: inputs.digest(function, "it"), **inputs.digests}

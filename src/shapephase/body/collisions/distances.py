@@ -37,6 +37,8 @@ def link_distances(body: Body | str, shape: ArrayLike, *, geometry: CollisionGeo
 
     The nearest two solids of two links count, and meshes as their convex hulls.
 
+    Source: Gilbert, Johnson and Keerthi 1988; van den Bergen 2001 for the depth, both as coal has them.
+
     Parameters
     ----------
     shape : (..., n) [rad or m]
@@ -48,10 +50,6 @@ def link_distances(body: Body | str, shape: ArrayLike, *, geometry: CollisionGeo
         If the last axis is not the body's n joints, or an entry is not finite.
     NoCollisionGeometryError
         If the body has no shapes.
-
-    Notes
-    -----
-    Source: Gilbert, Johnson and Keerthi 1988; van den Bergen 2001 for the depth, both as coal has them.
 
     Examples
     --------

@@ -90,6 +90,8 @@ class Visual:
 def inertia_box(mass: float, inertia: Array) -> tuple[Array, Array]:
     """The box of uniform density with a given mass and inertia about its centre.
 
+    A box has the second moment m a^2 / 12 along an edge a.
+
     Parameters
     ----------
     mass : [kg]
@@ -99,10 +101,6 @@ def inertia_box(mass: float, inertia: Array) -> tuple[Array, Array]:
     -------
     edges : (..., 3) [m]; zero along an axis where no mass distribution has so large a moment
     axes : (..., 3, 3) its axes as columns, a proper rotation
-
-    Notes
-    -----
-    A box has the second moment m a^2 / 12 along an edge a.
 
     Examples
     --------

@@ -205,6 +205,8 @@ def particle_body(
 ) -> ParticleBody:
     """A body of point masses from their places as a function of a shape.
 
+    Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, B1.
+
     Parameters
     ----------
     masses : (m,) [kg], positive, two or more
@@ -226,10 +228,6 @@ def particle_body(
         If `places` cannot be called.
     UnknownNameError
         If `continuous` or `limits` names another parameter.
-
-    Notes
-    -----
-    Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, B1.
 
     Examples
     --------

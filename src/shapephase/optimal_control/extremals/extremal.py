@@ -121,6 +121,10 @@ def extremal(
 
     Integrates Hamilton's equations of H = 1/2 (p - A^T l) g^-1 (p - A^T l), p = g r' + A^T l.
 
+    Equation :eq:`wong` of the documentation.
+    Source: Montgomery, Isoholonomic problems and some applications, Comm. Math. Phys. 128 (1990) 565-592, theorem 1 and
+    its Hamiltonian form; signs as in theory.md section 1.
+
     Parameters
     ----------
     shape, rate : (n,) at the start [rad or m], [rad/s or m/s]
@@ -140,12 +144,6 @@ def extremal(
         If a motion of the joints has no kinetic energy, so its rate is not determined.
     AccuracyNotReached
         If the integration breaks down or takes too many steps: such a shape lies ahead, or the charge is too large.
-
-    Notes
-    -----
-    Equation :eq:`wong` of the documentation.
-    Source: Montgomery, Isoholonomic problems and some applications, Comm. Math. Phys. 128 (1990) 565-592, theorem 1 and
-    its Hamiltonian form; signs as in theory.md section 1.
 
     Examples
     --------

@@ -150,6 +150,8 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
     body that keeps the start and the end turns the extremal into others with the same end, so the end of an optimal
     loop is then a conjugate time, of the dimension of the symmetry.
 
+    Source: Agrachev and Sachkov, Control Theory from the Geometric Viewpoint, section 21.
+
     Parameters
     ----------
     motion : the extremal
@@ -166,10 +168,6 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
         If the extremal is at rest: all its Jacobi fields vanish with the speed.
     AccuracyNotReached
         If the integration breaks down before `until`.
-
-    Notes
-    -----
-    Source: Agrachev and Sachkov, Control Theory from the Geometric Viewpoint, section 21.
 
     Examples
     --------

@@ -51,8 +51,6 @@ class _Iterate:
 class _BoundaryProblem:
     """Extremals from `start` that have to end at `end`, turned by `turn`, after `duration`.
 
-    Attributes
-    ----------
     body, metric, equations : see `extremal`
     start, end : (n,) shapes
     turn : (3, 3) attitude at the end
@@ -133,6 +131,8 @@ def shoot(
     symmetry of the body turns one solution into others the derivative is singular, and the damping, which falls with
     the residual, leads to a nearest solution all the same (Yamashita and Fukushima 2001: quadratically).
 
+    Raises also the errors of `extremal` and `wong_residual`.
+
     Parameters
     ----------
     path : start, end and duration are kept; the rate and charge of `wong_residual` are the first guess
@@ -145,10 +145,6 @@ def shoot(
     AccuracyNotReached
         If it does not converge: the message holds the remaining distance. Plans of bodies of up to 36 joints are near
         enough from 20 pieces on, except where light joints whirl.
-
-    Notes
-    -----
-    Raises also the errors of `extremal` and `wong_residual`.
 
     Examples
     --------

@@ -71,6 +71,8 @@ def wong_residual(
     The equations are integrated (du Bois-Reymond), p = g r' + A^T l = p(0) + integral of dL/dr: the rate of a spline
     counts, not its acceleration, and a jump of the rate is an error like any other.
 
+    Source: see `extremal`.
+
     Parameters
     ----------
     path : open or closed; between its breaks smooth
@@ -86,10 +88,6 @@ def wong_residual(
         See `extremal`; at any shape of the path.
     AccuracyNotReached
         If the path is too rough between its breaks for the integral to be found.
-
-    Notes
-    -----
-    Source: see `extremal`.
 
     Examples
     --------

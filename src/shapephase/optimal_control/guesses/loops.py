@@ -36,8 +36,6 @@ _SAME = 1e-6  # [rad or m] between guesses that clipping to limits has made equa
 class Guess:
     """Motion of the joints from which a search starts.
 
-    Attributes
-    ----------
     control : (k, m) control points
     motion : its rough reconstruction
     goal_error : angle between its attitude at the end and the goal [rad]
@@ -69,14 +67,9 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     the start, once or twice round, are tried by the integrator; for each direction and number of rounds the size is
     taken that comes near the goal at the least cost, and the cheapest come first.
 
-    Raises
-    ------
-    PlanNotFound
-        If no guess can be reconstructed.
-
-    Notes
-    -----
     Source: Montgomery 1990, isoholonomic problem; theory.md B6.
+
+    Raises PlanNotFound if no guess can be reconstructed.
     """
     families = [*_circles(task), *([curve] for curve in _straight(task))]
     rng = np.random.default_rng(seed)

@@ -11,9 +11,10 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array, Integers
+from ...chebyshev import gauss_tableau
 from ...shape_space.connection import mechanical_connection
 from .._polish import end_conditions
-from .._spline_basis import SplineBasis, gauss_tableau
+from .._spline_basis import SplineBasis
 from ..collocation import STAGES, CollocationProgram, NlpSolution, final_conditions
 from ..cost_metric import METRIC_COSTS
 from ..nodes.node_functions import node_functions
@@ -40,8 +41,6 @@ class Layout:
 
     A spline on equal pieces repeats itself where its control points do.
 
-    Attributes
-    ----------
     strokes : of each leg the pieces of a stroke, and how often it is gone round
     """
 
@@ -87,8 +86,6 @@ class StrokeProgram(CollocationProgram):
 
         q_next = q_end q_stroke^rounds.
 
-    Attributes
-    ----------
     places : places of the nodes on the spline
     program, derivatives : as for `CollocationProgram`
     """

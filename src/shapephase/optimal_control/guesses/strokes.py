@@ -36,8 +36,6 @@ _RIDGE = 1e-3  # on the metric, share of its mean eigenvalue, so that every moti
 class Stroke:
     """A loop of the joints that turns the body far for its length.
 
-    Attributes
-    ----------
     curve : (S + 1, m) its shapes, the last equal to the first
     turn : (3,) rotation vector of the body, base axes at its start [rad]
     length : length in the metric of the task

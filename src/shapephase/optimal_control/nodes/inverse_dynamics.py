@@ -48,8 +48,6 @@ from .spatial import Twist, gathered, links_of, passed_on, screws_of
 class InverseDynamics:
     """CasADi functions of x = (coordinates, rates, accelerations of all k joints, momentum): (3 k + 3,).
 
-    Attributes
-    ----------
     efforts : x -> efforts of all joints (k,)
     slopes : x -> their derivatives (k, 3 k + 3)
     second : x, factors (k,) -> second derivatives (3 k + 3, 3 k + 3) of their product with the efforts

@@ -20,8 +20,6 @@ _COUNTS = 1e-6  # share of the largest multiplier below which a distance has no 
 class DistanceTerms:
     """Distances of pairs of links at the nodes of a program.
 
-    Attributes
-    ----------
     values, jacobian : expressions of the unknowns, (K N,) and its derivative: all distances at each of N places [m]
     """
 

@@ -24,8 +24,6 @@ class NodeEfforts:
     Shares are efforts relative to their measure, of the joints that have one: (l,). The load is T times the sum of
     their squares: its integral over places is that of the squares over time.
 
-    Attributes
-    ----------
     shares : y -> shares (l,)
     load : y -> load of the shares
     slopes : y -> derivatives of the shares (l, 3 m + 5)
@@ -103,8 +101,6 @@ def _dynamics_arguments(task: Reorientation) -> tuple[Any, Any, Any]:
 class EffortTerms:
     """Efforts at the nodes and at the ends of pieces, and the integral of their squares.
 
-    Attributes
-    ----------
     values, jacobian : expressions of the unknowns, (j,) and (j, N): all shares at each place; empty without limits
     cost : [s]
     """

@@ -22,8 +22,6 @@ from .node_mechanics import SIZE, node_mechanics
 class NodeFunctions:
     """CasADi functions of a node's y = (r, u, q, T): shape, its derivative by place, quaternion, duration.
 
-    Attributes
-    ----------
     values : y -> dq/ds (4,) and the density of the cost
     jacobian : y -> derivative of dq/ds by y, (4, 2 m + 5)
     hessian : y, multipliers of dq/ds (4,), factor of the density -> second derivatives of the weighted sum

@@ -172,10 +172,7 @@ def up_axis(up: str | None, body: Body | None) -> Array:
     Robots and most bodies have x in front and z up, so that left and right are mirror images across y; models of
     people from biomechanics have y up, and left and right across z.
 
-    Raises
-    ------
-    UnknownNameError
-        For an unknown axis.
+    Raises UnknownNameError for an unknown axis.
     """
     if up is not None:
         check_choice(up, "axis", AXES)

@@ -30,8 +30,6 @@ class PlaneSeries:
 
     Both are entire functions of the angles, so that few terms are enough; the connection, their quotient, needs many.
 
-    Attributes
-    ----------
     box : (2, 2) lowest and highest of each joint [rad or m], where x and y are -1 and 1
     inertia : (n, n, 3, 3) coefficients, base axes [kg m^2]
     momentum : (n, n, 3, 2) coefficients, base axes [kg m^2/s per unit of joint rate]

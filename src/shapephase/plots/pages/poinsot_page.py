@@ -38,6 +38,8 @@ def rolling_ellipsoid(
     point of contact is the angular velocity; it draws the polhode on the ellipsoid and the herpolhode on the plane.
     Lengths are angular velocities [rad/s]. The momentum points down, so that the plane lies below, as a table does.
 
+    Source: Marsden and Ratiu, section 15.5; theory.md H2, I1.
+
     Parameters
     ----------
     top : with angular momentum
@@ -50,10 +52,6 @@ def rolling_ellipsoid(
     ------
     ShapeError
         For a top without momentum; a duration or a speed that is not above 0; fewer than two frames.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, section 15.5; theory.md H2, I1.
 
     Examples
     --------

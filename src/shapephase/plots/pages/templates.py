@@ -45,8 +45,6 @@ def page_from(
 ) -> Page:
     """Return a page that needs no other file.
 
-    Parameters
-    ----------
     template : name of a file of `templates/`
     scripts, styles : names of files of `static/`, without their endings, in the order in which they are read
     data : for the scripts

@@ -74,10 +74,7 @@ def check_video(path: str | os.PathLike[str], pixels: Sequence[int]) -> str:
 def chromium() -> str:
     """Return the browser that draws: that of the environment variable CHROMIUM, or the first that is found.
 
-    Raises
-    ------
-    MissingExtraError
-        If there is none.
+    Raises MissingExtraError if there is none.
     """
     named = os.environ.get("CHROMIUM")
     found = shutil.which(named) if named else next((path for name in _BROWSERS if (path := shutil.which(name))), None)
@@ -99,10 +96,7 @@ def frame_times(ending: str, duration: float, speed: float) -> Array:
 def write_video(page: str, path: str | os.PathLike[str], times: Array, pixels: tuple[int, int]) -> None:
     """Draw a page of a motion at these times, and write the film; whole or not at all.
 
-    Raises
-    ------
-    OutputFileError
-        If the browser or ffmpeg fails.
+    Raises OutputFileError if the browser or ffmpeg fails.
     """
     ending = Path(path).suffix.lower()
     write = {".gif": _gif, ".mp4": _mp4, ".png": _strip}[ending]

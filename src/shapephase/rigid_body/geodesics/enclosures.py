@@ -75,17 +75,15 @@ def distance_enclosure(
     Raises ShapeError if the attitude is not one rotation, width not between 0 and 1 or most_cells below 1;
     AccuracyNotReached as `shortest_geodesic`.
 
+    Equations :eq:`cell-deviation`, :eq:`cell-rest`, :eq:`way-left`, :eq:`climb` and :eq:`second-variation` of the
+    documentation.
+
     Parameters
     ----------
     metric : of `left_invariant_metric`
     attitude : (3, 3)
     width : relative to the distance
     most_cells : of work; where they do not suffice the enclosure is wider
-
-    Notes
-    -----
-    Equations :eq:`cell-deviation`, :eq:`cell-rest`, :eq:`way-left`, :eq:`climb` and :eq:`second-variation` of the
-    documentation.
 
     Examples
     --------
@@ -188,16 +186,14 @@ def diameter_enclosure(
 
     Raises ShapeError if width is not between 0 and 1 or most_cells below 1; AccuracyNotReached as `shortest_geodesic`.
 
+    Equation :eq:`symmetric-arrivals` of the documentation. That no attitude is further than that half turn is no
+    theorem for three different moments.
+
     Parameters
     ----------
     metric : of `left_invariant_metric`
     width : relative to the diameter
     most_cells : of work; where they do not suffice the enclosure is wider
-
-    Notes
-    -----
-    Equation :eq:`symmetric-arrivals` of the documentation. That no attitude is further than that half turn is no
-    theorem for three different moments.
 
     Examples
     --------

@@ -115,6 +115,8 @@ def smoothed_path(
     A periodic spline runs smoothly from its end to its start, and its ends are equal. The first and the last sample
     are then two measurements of one shape: their mean is used, with the weight of both.
 
+    Source: Reinsch 1967 (the spline); Wahba 1985 (the penalty); own derivation (the bias).
+
     Parameters
     ----------
     times : (N,) ascending; the path starts at 0 [s]
@@ -136,10 +138,6 @@ def smoothed_path(
     -----
     TrajectoryWarning
         For a joint that moves no more than its noise.
-
-    Notes
-    -----
-    Source: Reinsch 1967 (the spline); Wahba 1985 (the penalty); own derivation (the bias).
 
     Examples
     --------

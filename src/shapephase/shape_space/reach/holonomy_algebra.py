@@ -131,6 +131,8 @@ def reachable(
     order m of their stroke. Both are computed: `rank` is that of the curvature around the shape, `orders` have the
     derivatives. Whole turns of a joint without end, as of a reaction wheel, may add to that and are not examined.
 
+    Source: theory.md B6; Ambrose and Singer 1953; Shapere and Wilczek 1989; Montgomery 2002, chapter 12.
+
     Parameters
     ----------
     shape : (n,) where the loops begin [rad or m]; None: neutral
@@ -143,10 +145,6 @@ def reachable(
         If the shape is not one of the body, or `most_orders` or the tolerance is out of range.
     SingularInertiaError
         If at that shape or around it all mass is on one line.
-
-    Notes
-    -----
-    Source: theory.md B6; Ambrose and Singer 1953; Shapere and Wilczek 1989; Montgomery 2002, chapter 12.
 
     Examples
     --------

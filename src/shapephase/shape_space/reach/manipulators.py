@@ -25,6 +25,8 @@ def generalised_jacobian(
     With the base at rest it is the usual Jacobian [Jv; Jw]. The base turns at -A(r) rate, A the mechanical connection,
     about the centre of mass, which stays: [Jv + hat(p) A; Jw - A], p from the centre of mass.
 
+    Source: Umetani and Yoshida 1989; theory.md B1.
+
     Parameters
     ----------
     shape : (..., n) [rad or m]
@@ -40,10 +42,6 @@ def generalised_jacobian(
     ------
     UnknownNameError, ShapeError
         If there is no such link, or arrays have other shapes.
-
-    Notes
-    -----
-    Source: Umetani and Yoshida 1989; theory.md B1.
 
     Examples
     --------
@@ -83,8 +81,6 @@ def reaction_null_space(body: Body | str, shape: ArrayLike) -> Array:
 
     Those whose angular momentum J rate vanishes: k = n - 3, or more where the joints cannot turn it about every axis.
 
-    Notes
-    -----
     Raises like `Body.locked_inertia`. Source: Nenchev, Umetani and Yoshida 1992; theory.md A7.
 
     Examples
@@ -112,13 +108,11 @@ def dynamic_manipulability(
     There the hand cannot move in some direction, whatever the joints do, though the arm itself may; unlike singular
     shapes of an arm on the ground, they depend on masses.
 
+    Raises like `generalised_jacobian`. Source: Papadopoulos and Dubowsky 1993.
+
     Parameters
     ----------
     directions : (k, 6) rows of the hand's velocity that count, such as `numpy.eye(6)[:2]` in a plane; None: all
-
-    Notes
-    -----
-    Raises like `generalised_jacobian`. Source: Papadopoulos and Dubowsky 1993.
 
     Examples
     --------

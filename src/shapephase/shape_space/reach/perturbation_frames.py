@@ -119,6 +119,8 @@ def minimum_perturbation(
     divergence, and one integral of it, exp(-integral of A), predicts the turn of a loop better than in the base or in
     `mean_body_gauge`, which is best near one shape only.
 
+    Source: Travers, Hatton and Choset 2013 (minimum perturbation); theory.md B4.
+
     Parameters
     ----------
     centre : (n,) of the region [rad or m]
@@ -131,10 +133,6 @@ def minimum_perturbation(
         If the region is none of the body's shapes, or there would be more than 3,000 terms.
     AccuracyNotReached
         If the frame is not found, as over a region so wide that the body turns over in it.
-
-    Notes
-    -----
-    Source: Travers, Hatton and Choset 2013 (minimum perturbation); theory.md B4.
 
     Examples
     --------
