@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -146,7 +146,7 @@ def restriction_matrix(count: int, left: float, right: float) -> Array:
     return values_to_coefficients(count - 1) @ chebyshev(np.clip(nodes, -1.0, 1.0), count)
 
 
-@lru_cache(maxsize=16)
+@cache
 def gauss_tableau(count: int) -> tuple[Array, Array, Array]:
     """Gauss nodes and weights of [0, 1], and the integrals from 0 to each node of the polynomials through them."""
     legendre = np.polynomial.legendre

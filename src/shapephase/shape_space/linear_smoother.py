@@ -21,7 +21,7 @@ _NARROWEST = 10.0**-0.5  # least width tried, in steps of time: next to no smoot
 _WIDEST = 10.0**2.5  # largest width tried, in steps of time: beyond 300 samples rounding enters the bias
 _WIDTHS_A_DECADE = 6  # tried; a parabola through the best and its neighbours has the optimum
 _AT_ONCE = 16  # right sides: SuperLU goes through all of them at each row, and many leave the processor's cache
-_ROUNDED = 24  # widths per decade that are used: joints of equal width are smoothed together
+_ROUNDED = 4 * _WIDTHS_A_DECADE  # widths per decade that are used: joints of equal width are smoothed together
 
 
 @frozen
