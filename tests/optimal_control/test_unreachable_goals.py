@@ -238,6 +238,24 @@ def test_a_hinge_tilted_by_ever_less_is_still_searched_for(tilt, load_urdf):
 
 
 @pytest.mark.usefixtures("few_guesses")
+def test_particles_of_a_plane_that_lie_on_a_line_at_some_shapes_do_not_leave_it():
+    """From 1 rad a triangle is a line at 0 and pi: there the way to most shapes has no attitude to carry axes along."""
+
+    def places(shapes):
+        angle, side = shapes.T
+        zero, one = np.zeros((2, len(shapes)))
+        one = one + 1.0
+        tip = np.stack([np.cos(angle), np.sin(angle), zero], axis=-1)
+        corners = np.stack([np.zeros_like(tip), np.stack([one, zero, zero], axis=-1), side[:, None] * tip], axis=1)
+        slopes = np.zeros((len(shapes), 2, 3, 3))
+        slopes[:, 0, 2], slopes[:, 1, 2] = side[:, None] * np.cross(Z, tip), tip
+        return corners, slopes
+
+    body = sp.particle_body([1.0, 1.0, 1.0], places, ["angle", "side"], limits={"side": (0.3, 2.0)})
+    with pytest.raises(UnreachableGoalError, match="one axis alone"):
+        plan_reorientation(body, turn(X, 0.2), start=[1.0, 1.0], search=Search(time_limit=0.1))
+
+
 def test_a_turn_in_the_plane_is_planned(load_urdf):
     goal = turn(Z, 0.2)
     plan = plan_reorientation(load_urdf(chain(3)), goal, limits=Limits(rate_limits=None), search=Search(pieces=8))

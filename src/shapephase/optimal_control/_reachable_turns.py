@@ -67,10 +67,11 @@ class _ReachableTurns:
 
 def check_reachable(tasks: Sequence[Reorientation]) -> None:
     """Raise UnreachableGoalError if no motion of the joints reaches any of several goals of one body."""
-    try:
-        turns = _reachable_turns(tasks[0])
-    except (SingularInertiaError, AccuracyNotReached, ShapeError):  # particles may have no places far away
-        return
+    turns = None
+    for radius in _RADII:  # particles may have no places far away, or lie on a line on the way there
+        with suppress(SingularInertiaError, AccuracyNotReached, ShapeError):
+            turns = _reachable_turns(tasks[0], radius)
+            break
     if turns is None:
         return
     errors = [turns.goal_error(task) for task in tasks]
@@ -91,16 +92,16 @@ def check_reachable(tasks: Sequence[Reorientation]) -> None:
     )
 
 
-def _reachable_turns(task: Reorientation) -> _ReachableTurns | None:
+def _reachable_turns(task: Reorientation, radius: float) -> _ReachableTurns | None:
     """Return the smallest known superset of the attitudes at the end; None where none is known."""
     moves = np.flatnonzero(task.movable)
     if not len(moves):
         return _rigid_turns(task)
     if task.end is not None and not task.momentum.any():
-        turns = _loop_turns(task, moves)
+        turns = _loop_turns(task, moves, radius)
         if turns is not None:
             return turns
-    return _planar_turns(task, moves) if _is_analytic(task.body) else None
+    return _planar_turns(task, moves, radius) if _is_analytic(task.body) else None
 
 
 def _rigid_turns(task: Reorientation) -> _ReachableTurns | None:
@@ -117,9 +118,9 @@ def _rigid_turns(task: Reorientation) -> _ReachableTurns | None:
     return _ReachableTurns(motion.final_attitude, link, reason, remedy)
 
 
-def _loop_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
+def _loop_turns(task: Reorientation, moves: Integers, radius: float) -> _ReachableTurns | None:
     """Attitudes without momentum between two given shapes: loops at the start, then the straight path."""
-    axes = np.zeros((0, 3)) if len(moves) == 1 else _holonomy_axes(task, moves)
+    axes = np.zeros((0, 3)) if len(moves) == 1 else _holonomy_axes(task, moves, radius)
     if axes is None:
         return None
     start, end = task.shapes(task.start), task.shapes(task.start if task.end is None else task.end)
@@ -140,13 +141,13 @@ def _loop_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
     return _ReachableTurns(straight, np.eye(3), reason, remedy, axis=axes[0] if len(axes) else None)
 
 
-def _holonomy_axes(task: Reorientation, moves: Integers) -> Array | None:
+def _holonomy_axes(task: Reorientation, moves: Integers, radius: float) -> Array | None:
     """Axis of the holonomy algebra at the start, (0, 3) or (1, 3); None: it may be complete."""
     body = task.body
     if not _is_analytic(body):
         return None
     frame = task.coupling[:, moves] * _strokes(task)[moves]
-    shapes = task.shapes(_drawn(task))
+    shapes = task.shapes(_drawn(task, radius))
     first, second = np.triu_indices(len(moves), 1)
     magnitude = 0.0
 
@@ -173,9 +174,9 @@ def _axes(vectors: Array, magnitude: float) -> Array:
     return axes * np.sign(largest)
 
 
-def _planar_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
+def _planar_turns(task: Reorientation, moves: Integers, radius: float) -> _ReachableTurns | None:
     """Attitudes where all turns, the momentum and a principal axis of inertia at all shapes have one axis."""
-    body, coordinates = task.body, _drawn(task)
+    body, coordinates = task.body, _drawn(task, radius)
     shapes, strokes = task.shapes(coordinates), _strokes(task)[moves]
     connection, frame = mechanical_connection(body, shapes), task.coupling[:, moves] * strokes
     vectors = np.swapaxes(connection @ frame, -1, -2).reshape(-1, 3)
@@ -205,16 +206,10 @@ def _planar_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | Non
     return _ReachableTurns(np.eye(3), link, f"{reason}, that of the momentum", remedy, axis=axis)
 
 
-def _drawn(task: Reorientation) -> Array:
-    """Coordinates drawn within the limits (N, m); nearer to the start where particles have no places farther away."""
-    strokes, coordinates = _strokes(task), np.zeros((0, task.dimension))
-    for radius in _RADII:
-        rng = np.random.default_rng(_SEED)
-        coordinates = rng.uniform(*task.reach(radius * strokes), (_SHAPES, task.dimension))
-        with suppress(ShapeError):
-            task.body.locked_inertia(task.shapes(coordinates))
-            break
-    return coordinates
+def _drawn(task: Reorientation, radius: float) -> Array:
+    """Coordinates drawn within the limits, up to a radius from the start [strokes]: (N, m)."""
+    reach = task.reach(radius * _strokes(task))
+    return np.random.default_rng(_SEED).uniform(*reach, (_SHAPES, task.dimension))
 
 
 def _is_analytic(body: Body | ParticleBody) -> bool:

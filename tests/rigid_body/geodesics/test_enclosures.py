@@ -305,6 +305,16 @@ def test_too_little_work_leaves_the_bounds_of_axisymmetric_metrics():
     assert largest.upper == axisymmetric_metric(1.3, 3.5).diameter
 
 
+@pytest.mark.parametrize("moments", [(1.0, 2.0, 3.0), (1.0, 1.0, 2.0), (1.0, 2.0, 1e6)], ids=str)
+def test_turns_near_rounding_are_enclosed(moments):
+    """To less than their square, such turns are straight: an attitude's digits are 1e-16, not relative to the turn."""
+    metric = left_invariant_metric(moments)
+    for turn in (1e-8, 1e-12, 1e-14):
+        about_third = np.array([0.0, 0.0, turn])
+        found, expected = distance_enclosure(metric, so3.exp(about_third)), np.sqrt(moments[2]) * turn
+        assert found.lower <= expected <= found.upper
+
+
 def test_an_end_that_is_met_to_the_last_digit_has_no_gap():
     """About a forbidden axis, too, where an infinite moment times a missed angle of 0 is not a number."""
     assert distance.gap(left_invariant_metric([1.0, 2.0, np.inf]), 0.0) == 0.0

@@ -191,6 +191,7 @@ QUESTIONS = {
         {"degrees": False},
         "'base_roll_deg' is in degrees by its name",
     ),
+    "turns or places": (["base_rx", "base_ry", "base_rz"], ANGLES, {}, "unknown column .* 'base_rx'"),
     "too far": (RPY, 1e12 * ANGLES, {"degrees": False}, "up to 1e.06 rad or m can be represented"),
     "no number": (RPY, np.where(np.arange(3) == 1, np.nan, ANGLES), {}, "column 'base_pitch' has no number"),
     "an order of a quaternion": (SPELLINGS["q"][0], XYZW, {"base_order": "xyz"}, "base_order is for angles"),

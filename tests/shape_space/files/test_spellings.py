@@ -434,6 +434,16 @@ def test_a_wheel_that_turns_far_is_asked_about_and_comes_back_as_it_was_written(
     np.testing.assert_allclose(back.shape(path.breaks), path.shape(path.breaks), rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.parametrize(("body", "joint"), [("diver", "left_shoulder_abduction"), ("satellite", "wheel_spin")])
+def test_angles_wrapped_to_one_turn_are_warned_of(body, joint):
+    """Limits of ±3.2 rad, or none: a path through the jump turns back through all of the turn within one sample."""
+    times, whole = np.linspace(0.0, 1.4, 71), 2.0 * np.pi
+    angles = 2.9 + 0.6 * np.sin(np.pi * np.linspace(0.0, 1.0, 71)) ** 2
+    wrapped = (angles + np.pi) % whole - np.pi
+    with pytest.warns(sp.TrajectoryWarning, match=f"joint {joint} jumps by .*unwrap"):
+        read_recorded_motion({"time": times, joint: wrapped}, sp.load_body(body), degrees=False, rest_missing=True)
+
+
 @pytest.mark.parametrize(
     ("module", "file", "extra"),
     [

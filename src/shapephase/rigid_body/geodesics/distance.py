@@ -147,11 +147,14 @@ def proven_bounds(
     metric: LeftInvariantMetric, goal: Goal, found: ShortestGeodesic, width: float, most: int
 ) -> tuple[float, float, int]:
     """Bounds of the distance that differ by the part `width` if `most` cells suffice, and the cells' number."""
-    upper = found.length + gap(metric, found.residual)
+    # About a forbidden axis the residual alone counts: the gap of any rounding is a long loop.
+    rounding = _ROUNDING * float(np.sqrt(metric.moments[np.isfinite(metric.moments)][-1])) if found.length else 0.0
+    upper = found.length + gap(metric, found.residual) + rounding
     if found.certified:
-        return min(found.length * (1.0 - _MARGIN * width), found.length), upper, 0
-    stop, begin = upper * (1.0 - width * (1.0 - _MARGIN)), found.lower_bound * (1.0 - _CLOSE)
-    if begin >= stop:
+        return max(found.length * (1.0 - _MARGIN * width) - rounding, 0.0), upper, 0
+    stop = upper * (1.0 - width * (1.0 - _MARGIN))
+    begin = max(found.lower_bound * (1.0 - _CLOSE) - rounding, 0.0)
+    if not 0.0 < begin < stop:
         return begin, upper, 0
     search = first_arrival(metric.inverse_moments, goal, begin, stop, most)
     return search.time, upper, search.work

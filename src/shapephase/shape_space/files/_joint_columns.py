@@ -189,7 +189,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
         if joint in labels and joint not in stated_units:
             check_unit(shapes[:, joint], joint, body, recording)
     shapes = continued_hinges(shapes, body, recording)
-    for joint in np.flatnonzero(body.continuous).tolist():
+    for joint in np.flatnonzero(np.array(body.joint_units) == "rad").tolist():
         warn_of_turns(shapes[:, joint], body.joint_names[joint], recording)
     for joint, text in labels.items():
         if body.joint_units[joint] != NO_UNIT:

@@ -49,7 +49,7 @@ _BASE = frozenset(  # words before the kind that name no other part of the body
 ) | {"free", "floating", "freeflyer"}
 _FRAME = re.compile(r"[a-z]{1,2}")  # frames between a kind and its component, as in `p_RS_R_x`
 _IMU = frozenset(("imu", "sensor"))  # words that name the base's own sensor of rates
-_JOINED = re.compile(r"(q|quat|t|p|r|mrp|sigma|rotvec|pos)([wxyz]|\d)|(omega|w|gyro|gyr)([xyz])")
+_JOINED = re.compile(r"(q|quat|t|p|mrp|sigma|rotvec|pos)([wxyz]|\d)|(omega|w|gyro|gyr)([xyz])")
 _ANGULAR = re.compile(r"ang(?:ular)?[_ .]?(?:vel(?:ocity)?|rate)")
 _SPLIT = re.compile(r"[/.\s_\[\]()]+")
 CANONICAL = {  # kind -> component -> name of its column

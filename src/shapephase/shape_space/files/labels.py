@@ -397,7 +397,7 @@ def doubtful_turns(values: Array) -> bool:
 
 
 def warn_of_turns(values: Array, name: str, recording: Recording) -> None:
-    """Warn where a joint that turns without end jumps by about 2 pi: it is read as written, as a turn."""
+    """Warn where an angle jumps by about 2 pi, within its limits or without any: it is read as written, as a turn."""
     jumps = np.diff(values)
     turns = np.flatnonzero(np.abs(np.abs(jumps) - _WHOLE_TURN) < 0.5 * _HALF_TURN)
     if len(turns):

@@ -120,8 +120,8 @@ def read_recorded_motion(file: Any, body: Body | str, **options: Unpack[ReadingO
 
     Units stand in the labels, as `knee [deg]`, `knee (deg)`, `knee_deg`, `boom [mm]`, `Time [ms]`, or in a row of
     units below them. Without, times are in seconds, angles in radians and lengths in metres; values that resemble
-    milliseconds, degrees or millimetres raise an error that names the option to set. Angles are taken as written: a
-    joint that turns without end is not unwrapped.
+    milliseconds, degrees or millimetres raise an error that names the option to set. Angles are taken as written: one
+    that jumps by a whole turn is not unwrapped.
 
     Parameters
     ----------
