@@ -181,5 +181,5 @@ def _refusal(goals: Goals, best: Design, nearest: Member, cover: Cover | None, r
     shown = f"{' and '.join(wanted)}: of {best.members} members the nearest, x = {at}, {' and '.join(miss)}"
     if cover is None:
         return f"no member was found with {shown}; there may be one: {reason}"
-    boxes = f"{len(cover.least)} boxes, from members on a grid,"
-    return f"no member has {shown}; enclosures of {boxes} exclude all: another goal or a wider box"
+    excluded = f"enclosures of {len(cover.least)} boxes exclude all but what is narrower than their grid of members"
+    return f"no member has {shown}; {excluded}: another goal or a wider box"
