@@ -349,8 +349,8 @@ ODD_FILES = {
     "OpenSim, a muscle": (
         "m.sto",
         opensim(names=f"time {LEFT} /forceset/soleus/activation\n"),
-        C,
-        ["/forceset/soleus/activation"],
+        W,
+        ["no column for"],
     ),
     "OpenSim, coordinate twice": (
         "m.sto",
