@@ -34,7 +34,7 @@ class ForcedUncertainty:
     ----------
     state : (6, 6) covariance of the turn e [rad^2] and of the final momentum [(kg m^2/s)^2], inertial axes
     total_rotation : (3, 3) covariance of the rotation from the start to the end [rad^2]
-    total_angle : standard deviation of its angle [rad], near 0 and 180 degrees as of `Uncertainty`
+    total_angle : standard deviation of its angle [rad], near 0 and 180 degrees as in `Uncertainty`
 
     Examples
     --------
